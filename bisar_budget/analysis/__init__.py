@@ -1,4 +1,4 @@
-"""Analysis of one mission: its errors and their effects, the division of its budgets, the edge of its scene."""
+"""Analysis of one mission: its errors and their effects, the division of its budgets, and the edge of its scene."""
 
 # Names that other packages may import.
 __all__ = [

@@ -1,4 +1,7 @@
-"""Division of the budgets between transmitter, receiver and clock, and the gain of autofocus with its bounds."""
+"""Division of a mission's budgets between transmitter, receiver and clock, and the gain that autofocus adds.
+
+The module also gives upper bounds on N_pull, which sets this gain.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -23,10 +26,13 @@ EQUAL = Shares(transmitter=0.5, receiver=0.5)
 class Allocation(NamedTuple):
     """Budgets of a mission, divided between transmitter, receiver and clock.
 
-    `qpe_total` is the total quadratic phase error before autofocus. [rad] `qpe`, `pslr` and `islr` are the shares of
-    the owners. The shares of PSLR and ISLR are shares of power. `n_pull` is the N_pull of the autofocus after the
-    limitation by `effective_n_pull`: autofocus corrects up to π·N_pull rad at the aperture edge. `n_pull_stated` is
-    the value of `autofocus.n_pull` in the file. Both are None without autofocus.
+    `qpe_total` is the budget of the quadratic phase error (QPE) for the whole mission, without autofocus. [rad] The
+    owners of a budget are transmitter, receiver and clock. `qpe`, `pslr` and `islr` are their shares in the budgets
+    of QPE, PSLR and ISLR. The shares of PSLR and ISLR are shares of power.
+
+    Autofocus corrects up to π·N_pull rad at the aperture edge. `n_pull_stated` is the N_pull in the mission file
+    (`autofocus.n_pull`), and `n_pull` is this value after `effective_n_pull` has limited it. Both are None if the
+    mission has no autofocus.
     """
 
     qpe_total: float
@@ -40,27 +46,33 @@ class Allocation(NamedTuple):
     def autofocus_gain(self) -> Any:
         """Factor by which autofocus raises the limits of the quadratic phase error: π·N_pull/`qpe_total`, at least 1.
 
-        See Section VI. If the total is π/4, the factor is 4·N_pull.
+        The factor is 1 without autofocus. It follows from Section VI of the paper. For a `qpe_total` of π/4 it is
+        4·N_pull.
         """
         return _gain(self.n_pull, self.qpe_total)
 
     def qpe_limit(self, owner: str) -> float:
-        """Largest QPE that an owner may have without autofocus. [rad]"""
+        """Largest quadratic phase error that an owner may have without autofocus. [rad]"""
         return self.qpe.of(owner) * self.qpe_total
 
     def qpe_allowed(self, owner: str) -> Any:
-        """Largest QPE that an owner may have with autofocus. [rad]"""
+        """Largest quadratic phase error that an owner may have with the mission's autofocus. [rad]"""
         return self.qpe_limit(owner) * self.autofocus_gain
 
     def of(self, case: int) -> "Allocation":
-        """Return the budgets of the case with index `case`, with plain numbers in place of arrays (cases,)."""
+        """Return the budgets of one case as plain numbers.
+
+        `case` is the index of the case in the arrays (cases,).
+        """
         return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
-        """Note on the smallest N_pull with which an owner's QPE would pass, or on why autofocus cannot correct it.
+        """Note on the smallest N_pull with which an owner's phase error would pass, or on why no N_pull is enough.
 
-        `qpe` is the quadratic phase at the aperture edge, which autofocus corrects. [rad] `hidden` is the equivalent
-        quadratic phase of the loss that autofocus does not correct. [rad] Both are combined as a root-sum-square.
+        `qpe` is the quadratic phase at the aperture edge, which autofocus corrects. [rad] `hidden` is the quadratic
+        phase that would cause the same peak loss as the errors that autofocus does not correct. [rad] The judged
+        phase is the root-sum-square of `qpe` and of `hidden` times the autofocus gain. No N_pull is therefore enough
+        if `hidden` reaches the owner's limit without autofocus.
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -76,9 +88,10 @@ def _gain(n_pull: float | None, qpe_total: float) -> PerCase:
 
 
 def autofocus_gain_of(mission: Mission) -> PerCase:
-    """Return the factor by which a mission's autofocus raises QPE limits.
+    """Return the factor by which a mission's autofocus raises the limits of the quadratic phase error.
 
-    It does not depend on the division of the budget.
+    The factor is at least 1, and it is 1 without autofocus. It does not depend on how the budget is divided between
+    transmitter, receiver and clock.
     """
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
@@ -90,7 +103,7 @@ def _plain(figure: Any, case: int) -> Any:
 
 
 def is_balanced(mission: Mission) -> bool:
-    """Whether the shares of the quadratic phase are set in proportion to the declared errors."""
+    """Whether the mission file divides the budget of the quadratic phase in proportion to the declared errors."""
     split = mission.allocation.split
     return (split.quadratic_phase_error if isinstance(split, MetricSplits) else split) == "balanced"
 
@@ -101,9 +114,10 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
     Parameters
     ----------
     mission : Mission
-        Some of its numbers may be arrays (cases,). Shares that are `balanced` are then arrays too.
+        Mission whose budgets are divided. Some of its numbers may be arrays (cases,).
     gates : iterable of Together
-        Declared errors in each model that gates. They are needed only for `balanced`, which weighs their phases.
+        Declared errors in each gating model. They are used only for the split `balanced`, which sets the shares in
+        proportion to the phases of these errors. The shares are then arrays (cases,) if there are several cases.
     """
     split = mission.allocation.split
     qpe, pslr, islr = (
@@ -122,8 +136,8 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 def _balanced(gates: Sequence[Together]) -> Shares:
     """Shares of transmitter and receiver in proportion to the combined phases of their declared errors.
 
-    If several models gate, each error has the largest of its judged phases in these models. Each share is limited to
-    `BALANCED_RANGE`.
+    `gates` holds the declared errors in each gating model. With two gating models, each error counts with the larger
+    of its two judged phases. Each share is limited to `BALANCED_RANGE`. Both shares are 1/2 if all phases are 0.
     """
     weights = []
     for owner in ("transmitter", "receiver"):
@@ -140,7 +154,7 @@ def _balanced(gates: Sequence[Together]) -> Shares:
 
 
 def _largest(phases: Sequence[Floats]) -> Floats:
-    """Phase with the largest magnitude among the given ones, with its sign, for each case. [rad]"""
+    """Phase with the largest magnitude among several arrays (cases,), with its sign, for each case. [rad]"""
     if len(phases) == 1:
         return phases[0]
     of_all = np.array(phases)
@@ -159,18 +173,19 @@ ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest size of the patch, in units of
 class Caps(NamedTuple):
     """Upper bounds on a useful N_pull: `walk`, set by range walk, and `scene`, set by the size of the scene.
 
-    `walk` is f₀/B. The gain of autofocus is limited to it. `scene` is None if the file gives no size of the scene. If
-    N_pull exceeds `scene`, the report contains a warning.
+    `walk` is f₀/B. A larger N_pull is reduced to `walk`. `scene` is None if the mission file gives no size of the
+    scene. If N_pull exceeds `scene`, the report contains a warning.
 
-    A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ cells, and smears a
+    A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ range cells. It smears a
     point over 4N cross-range cells. The bounds were measured on images of points
     (`tests/simulate/test_pull_in_caps.py`). One-dimensional autofocus still works for a range walk of half a cell or
-    more. However, a walk of half a cell causes a loss of 0.6 dB that no phase correction recovers, and a walk of a
-    whole cell a loss of 1.3 dB.
+    more. However, no phase correction recovers the loss that range walk causes. The loss is 0.6 dB for a range walk
+    of half a cell and 1.3 dB for a whole cell.
 
-    Autofocus fails if the patch is too small, whatever the range walk and the bandwidth. Phase gradient autofocus
-    needs a patch of three times the smear, map drift autofocus one and a half times. With a smaller patch the image
-    stays smeared, for a range walk of a hundredth of a cell as well as for a third of a cell.
+    Autofocus also fails if the image patch on which it works is too small, at any range walk and bandwidth. The image
+    then stays smeared. Phase gradient autofocus needs a patch three times as wide as the smear, and map drift
+    autofocus needs a patch 1.5 times as wide. This was found for range walks of a hundredth of a cell and of a third
+    of a cell.
     """
 
     walk: float
@@ -178,7 +193,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """Upper bounds on the N_pull of a mission's autofocus, see `Caps`."""
+    """Return the upper bounds on the N_pull of a mission's autofocus, see `Caps`."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
@@ -187,14 +202,14 @@ def caps(mission: Mission) -> Caps:
 
 
 def range_walk_cap(mission: Mission) -> float:
-    """Bound f₀/B that range walk sets on N_pull, as a number or as an array (cases,)."""
+    """Upper bound f₀/B that range walk sets on N_pull, as a number or as an array (cases,)."""
     return mission.radar.center_frequency / mission.radar.bandwidth
 
 
 def effective_n_pull(mission: Mission) -> float | None:
-    """N_pull of the autofocus: the value in the file, limited to the bound by range walk.
+    """N_pull that a mission's autofocus reaches: the value in the mission file, but at most `range_walk_cap`.
 
-    None if no autofocus is declared.
+    The result is None if the file declares no autofocus.
     """
     stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
     if stated is None:
@@ -203,14 +218,14 @@ def effective_n_pull(mission: Mission) -> float | None:
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Note that gives the N_pull from which an error would pass, or the bound that rules out such an N_pull.
+    """Note on the N_pull with which an error would pass, or on the upper bound that this N_pull exceeds.
 
     Parameters
     ----------
     n_pull : float
-        Smallest N_pull with which the error passes.
+        Smallest N_pull with which the error would pass.
     caps : Caps
-        Bounds of the mission, from the function `caps`.
+        Upper bounds on the mission's N_pull, from the function `caps`.
     """
     if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
         allowed = f"the scene's size allows {rounded_down(caps.scene)}"
@@ -222,7 +237,7 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
 
 
 def _up(number: float) -> str:
-    """Format a number with three digits, rounded up.
+    """Format a number with three significant digits, rounded up.
 
     Numbers from 100 on are written as whole numbers with a space between thousands.
     """
@@ -233,7 +248,7 @@ def _up(number: float) -> str:
 
 
 def rounded_down(number: float) -> str:
-    """Format a number with three digits, rounded down.
+    """Format a number with three significant digits, rounded down.
 
     Numbers from 100 on are written as whole numbers with a space between thousands.
     """

@@ -1,7 +1,7 @@
-"""Analysis shared by the checks of a mission: geometry, every possible error, and its effects in both models.
+"""Analysis on which all checks of a mission rely: its geometry, its errors, and their effects in both models.
 
-Cases of the same structure are analysed together. `Case` gives plain numbers of a single case for the text of a
-report.
+A case is a mission with definite numbers. Cases whose mission files have the same structure are analysed together, in
+arrays (cases,). `Case` gives the plain numbers of a single case for the text of a report.
 """
 
 import math
@@ -37,9 +37,10 @@ __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 def by_nodes(
     mission: Mission, cases: int, geometry: BistaticGeometry
 ) -> Iterator[tuple[int, NDArray[np.intp], Mission, BistaticGeometry]]:
-    """Group the cases of a mission that need the same number of quadrature nodes over the aperture.
+    """Group the cases of a mission by the number of quadrature nodes that they need over the aperture.
 
-    Yields for each group the number of nodes, the indices of its cases, and their mission and geometry.
+    Yields a tuple for each group. It contains the number of nodes, the indices of the cases in the group, the mission
+    reduced to these cases, and the geometry of these cases.
     """
     T = np.broadcast_to(mission.collection.aperture_time, (cases,))
     counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
@@ -53,53 +54,59 @@ def by_nodes(
 
 
 class Analysis:
-    """Analysis of the cases of one mission. A mission as loaded from its file is one case.
+    """Errors and budgets of a mission in one or many cases.
+
+    A mission as loaded from its file is a single case.
 
     Parameters
     ----------
     mission : Mission
-        Some of its numbers may be arrays (cases,).
+        Mission to analyse. Some of its numbers may be arrays (cases,).
     cases : int
         Number of cases.
     geometry : BistaticGeometry, optional
-        Geometry of many cases; omitted: the geometry of a single mission.
+        Geometry of the cases. If omitted, there is a single case with the geometry of the mission.
     nodes : int, optional
-        Number of nodes of the aperture that all cases need.
+        Number of quadrature nodes over the aperture, the same for all cases. If omitted, it follows from the
+        geometry.
     shown : mapping of str to Subject, optional
-        Ids of rows whose allowable is needed although the file declares no error; omitted: all rows.
+        Rows whose allowable is needed even if the file declares no error for them. The keys are the ids of the rows.
+        If omitted, all rows are included.
     is_complete : bool
-        Compute all numbers of each row, not only those that decide. The results of a case then do not depend on the
-        number of cases.
+        Compute all numbers of each row, not only those that decide the result. The results of a case then do not
+        depend on how many cases are analysed together.
     is_of_sums : bool
-        Compute only the sums of errors. An error that counts in a sum then needs no allowable of its own.
+        Judge only the combined errors, and omit the allowables of the single errors. Ignored under the rule `each`.
 
     Attributes
     ----------
     exact : ExactRanges
         Exact range histories of all cases at the nodes of the aperture.
     errors : DeclaredErrors
-        Listed errors of the cases, with their effects: the declared errors and the errors in `shown`, or all errors
+        Declared errors and the errors of the rows in `shown`, with their effects. Without `shown` they are all errors
         that the cases can have.
     random : list of RandomError
-        Errors of sensors, clocks and the air that the mission names; empty if it names none.
+        Errors of the sensors, clocks and air that the mission file describes. The list may be empty.
     tones : list of Tone
-        Tones that make paired echoes: declared vibrations from one cycle per aperture on, and spurs.
+        Tones that make paired echoes. They are vibrations of at least one cycle per aperture, tones of vibrating
+        oscillators, and spurs.
     slow_tones : dict of str to SlowTone
-        Declared vibrations below three cycles per aperture; the keys are the ids of their rows.
+        Declared vibrations below three cycles per aperture. The keys are the ids of their rows.
     slow : list of DeclaredPhase
         Phases of the declared vibrations below one cycle per aperture.
     displacing_tones : list of ToneDisplacement
-        Displacement of the image by each vibration and each tone of an oscillator, slow or fast.
+        Displacement of the image by each vibration and each tone of an oscillator, at any frequency.
     groups : tuple of Correlated
         Covariances that the mission declares for the errors of its platforms.
     gates : list of str
-        Names of the gating models, which are those whose limits the mission must meet. There is one name, or both
-        names if the stricter model decides.
+        Names of the gating models. The list contains both models if the stricter model decides, otherwise a single
+        name.
     published, full : Model
-        The published model, Tables I and II and (25), which has no direct path; and the full model.
+        Effects of the errors in each model. The published model follows Tables I and II and (25) and does not include
+        the direct path. The full model follows from exact ranges.
     allocation : Allocation
-        Budgets of the cases, divided between the owners. A `balanced` division is in proportion to the phases in the
-        gating model, or under `strictest` to the larger of the phases in both models.
+        Budgets of the cases, divided between transmitter, receiver and clock. The split `balanced` divides in
+        proportion to the phases in the gating model. Under `strictest` it uses the larger phase of both models.
     """
 
     def __init__(
@@ -139,52 +146,62 @@ class Analysis:
         self._rests: dict[str, list[SpreadPhase]] = {}
 
     def together(self, model: str) -> Together:
-        """Declared errors combined in a model."""
+        """Return the declared errors and their combination in the model of the given name."""
         return self._together[model]
 
     def rests(self, model: str) -> list[SpreadPhase]:
-        """Phases beyond the cubic in a model; see `spread.rests`."""
+        """List the parts beyond the cubic order of the phases of declared errors, in the model of the given name.
+
+        They are computed by `spread.rests`.
+        """
         if model not in self._rests:
             self._rests[model] = rests(self, model)
         return self._rests[model]
 
     def models(self, gating: str) -> tuple[Model, Model]:
-        """The gating model and the other model, given the name of the gating model, `published` or `full`."""
+        """Return both models, with the gating model first.
+
+        `gating` is the name of the gating model, `published` or `full`.
+        """
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     # ---------------------------------------------------------------- what only some questions need
     @cached_property
     def resolution(self) -> Resolution:
-        """Widths of the impulse response without errors, (cases,)."""
+        """Widths of the error-free impulse response, as arrays (cases,)."""
         return resolution(self.exact, self.geometry, self.mission.radar, self.mission.collection.aperture_time)
 
     @cached_property
     def peak_loss_db(self) -> Floats:
-        """Loss of the image peak due to all declared errors, (cases,). [dB]"""
+        """Loss of the image peak due to all declared errors, (cases,). [dB]
+
+        It is NaN where an error leaves no image, or where no error is declared.
+        """
         return peak_loss_db(self)
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
-        """Errors of a single case in plain numbers, in the order that the contract defines."""
+        """List the errors of an analysis with a single case in plain numbers, in the order of the report's rows."""
         return [error.in_one_case() for error in self.errors.listed]
 
     @cached_property
     def stated(self) -> list[ErrorSource]:
-        """Declared errors along the axes in which the file states them."""
+        """List the declared errors of a single case along the axes in which the mission file states them."""
         return [source for source in self.sources if source.declared is not None and source.is_independent]
 
 
 class Case:
-    """One of the cases of an analysis.
+    """Results of an analysis for one of its cases, in plain numbers.
 
     Parameters
     ----------
     analysis : Analysis
-        Analysis of the cases.
+        Analysis of one or many cases.
     mission : Mission, optional
-        Mission of this case, as loaded; omitted: the analysed mission, which is the only case.
+        Mission of this case, as loaded from its file. If omitted, it is the mission of the analysis, which then has
+        only this case.
     place : int
-        Index of this case.
+        Index of this case in the arrays of the analysis.
     """
 
     def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
@@ -201,37 +218,39 @@ class Case:
 
     @cached_property
     def resolution(self) -> Resolution:
-        """Widths of the impulse response without errors in this case."""
+        """Widths of the error-free impulse response in this case."""
         return Resolution._make(map(self.number, self.analysis.resolution))
 
     @cached_property
     def peak_loss_db(self) -> float | None:
-        """Loss of this case's peak due to all declared errors; None without an image or declared error. [dB]"""
+        """Loss of the image peak in this case due to all declared errors. [dB]
+
+        It is None if an error leaves no image, or if no error is declared."""
         loss = self.number(self.analysis.peak_loss_db)
         return loss if math.isfinite(loss) else None
 
     @cached_property
     def allocation(self) -> Allocation:
-        """Budgets of this case, divided between the owners."""
+        """Budgets of this case, divided between transmitter, receiver and clock."""
         allocation = self.analysis.allocation
         return allocation if self.analysis.is_by_itself else allocation.of(self.place)
 
     @cached_property
     def random(self) -> list[RandomError]:
-        """Random errors of sensors, clocks and the air in this case, in the order of the analysis."""
+        """Random errors of sensors, clocks and the air in this case, in the same order as in `Analysis.random`."""
         if self.analysis.is_by_itself:
             return self.analysis.random
         return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
-        """Phases and displacements of a declared error in a model, in this case."""
+        """Return the phases and the displacement that a declared error causes in this case, according to a model."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
         """Displacement of the image, east and north, by the tone of a row in the model of the given name. [m]
 
-        Each component is that for the worst phase of the tone. None if the row has no tone or the model has no
-        displacement.
+        Each component is given for the phase of the tone at which it is largest. The result is None if the row has no
+        tone, or if the model determines no displacement, for example where Q has no inverse.
         """
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:
@@ -240,5 +259,8 @@ class Case:
         return None
 
     def degeneracy(self, model: str) -> Note:
-        """Note on why the image has no displacement in a model in this case; empty if it has one."""
+        """Note on the reason why a model gives no displacements in this case.
+
+        The note is empty if the model gives displacements.
+        """
         return self.analysis.errors.degeneracy(model, self.place)

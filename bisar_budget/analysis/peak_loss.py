@@ -1,10 +1,11 @@
 """Loss of the image peak due to all declared errors, for many cases at once.
 
-An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps
-|⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band. It is computed as a direct sum. With a
-random error whose phase has the variance σ², the peak keeps exp(-σ²) of its power; the same holds for a tone of any
-phase. Losses of independent errors add in decibels, as the variances of their phases do to second order. Derived
-here. `tests/theory/test_image_point.py` checks it against images formed by direct sums.
+An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps the
+fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band. The mean over the aperture is
+computed as a sum over its nodes. With a random error whose phase has the variance σ², the peak keeps the fraction
+exp(-σ²) of its power. The same holds for a tone of unknown phase. Losses of independent errors add in decibels,
+because the variances of their phases add to second order. Derived here. `tests/theory/test_image_point.py` checks it
+against images formed by direct sums.
 """
 
 import math
@@ -31,9 +32,9 @@ _DB_OF_VARIANCE = 10 / math.log(10)
 def peak_loss_db(analysis: "Analysis") -> Floats:
     """Loss of the image peak due to all declared errors, (cases,). [dB]
 
-    The mission's rule combines the losses of the errors. Under root-sum-square the decibels are added, and under a
-    sum the square roots of the decibels are added. Under `each` the largest loss is taken. The loss is NaN where an
-    error leaves no image, or where no error is declared.
+    The losses of single errors are combined by the mission's rule. Under root-sum-square the decibels are added.
+    Under `sum` the square roots of the decibels are added, and the result is squared. Under `each` the largest loss
+    is taken. The loss is NaN where an error leaves no image, or where no error is declared.
     """
     errors, together = analysis.errors, analysis.together("full")
     losses = list(_losses_of_motion(analysis, together.motion))
@@ -57,9 +58,10 @@ def peak_loss_db(analysis: "Analysis") -> Floats:
 
 
 def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> list[Floats]:
-    """Losses due to errors of motion and of clocks, for the worse sign of each error. [dB]
+    """List the peak loss due to each error of motion or of a clock, for the worse sign of the error, (cases,). [dB]
 
-    The six errors of a covariance are replaced by the independent errors that compose them.
+    Under root-sum-square the six correlated errors of a covariance are replaced by six independent errors that
+    together have the same covariance.
     """
     errors, together = analysis.errors, analysis.together("full")
     if not motion:
@@ -75,7 +77,10 @@ def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> li
 
 
 def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) -> Floats:
-    """Range errors that declared errors leave at their image points, (errors, signs, nodes, cases). [m]"""
+    """Range errors over the aperture that remain at the image point of each error. [m]
+
+    The result is (errors, signs, nodes, cases). The image point is the ground point to which an error displaces the
+    image. The errors have their declared sizes. The first of the two signs is the declared sign."""
     does = [errors.does("full", error) for error in motion]
     east, north = np.moveaxis(np.array([(effect.displacement, effect.opposite) for effect in does]), 2, 0)
     size = np.array([errors.array(error.declared) for error in motion])
@@ -87,9 +92,9 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
 
 
 def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
-    """Losses of the peak due to range errors, (..., cases). [dB]
+    """Losses of the image peak due to range errors over the aperture, (..., cases). [dB]
 
-    `remaining` are the range errors left at the nodes, (..., nodes, cases). [m]
+    `remaining` are the range errors at the aperture's nodes that remain at the image point, (..., nodes, cases). [m]
     """
     sampling = exact.sampling
     if (

@@ -1,18 +1,20 @@
 """Change of the quadratic phase error from the scene centre to the scene's edge, for many cases at once.
 
-The paper's errors are spatially invariant. In the full model they are not: both platforms have other lines of sight
-at a point p of the scene than at the scene centre. The exact ranges are therefore computed with p in place of the
-scene centre. An autofocus correction is one phase for the whole image, so it does not remove the difference between p
-and the centre. Derived here. `tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at
-250 m and 1 km.
+The paper's errors are spatially invariant. In the full model they are not, because the lines of sight of both
+platforms at a point p of the scene differ from the lines of sight at the scene centre. The exact ranges are therefore
+computed with p in place of the scene centre. An autofocus correction is a single phase history for the whole image,
+so it does not remove the difference between the phases at p and at the centre. Derived here.
+`tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at 250 m and 1 km.
 
-The requirement is that this difference stays within the total budget without the gain of autofocus, because it
-remains after autofocus has corrected an error of any size. Without autofocus, it is the phase that the edge adds to
-the phase at the centre, to which the rows of the report refer. The report also warns if the phase at the edge itself
-exceeds a limit, autofocus gain included, that the phase at the centre meets.
+The requirement is that this phase difference stays within the total budget without the gain of autofocus. The reason
+is that the difference remains after autofocus has corrected an error of any size. Without autofocus, the difference
+is the phase that the edge adds to the phase at the centre. The rows of the report refer to the centre. The report
+also warns if the phase at the edge exceeds a limit that the phase at the centre meets. This limit includes the
+autofocus gain.
 
-A place is a ground point of one of the cases. The argument `of` holds the index of the case for each place. The rows
-of arrays are the errors of motion and clocks, followed by the parts of the random errors (`scene_random`).
+A place is a ground point of the scene in one of the cases. The argument `of` holds the index of the case for each
+place. Along the axis "errors and parts", an array holds first the errors of motion and clocks. Then it holds the
+independent parts of which the random errors are composed (`scene_random`).
 """
 
 import math
@@ -41,48 +43,52 @@ from bisar_budget.units import format_quantity
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Settings of the searches around the scene centre.
+    """Numerical settings of the searches for the largest phase difference on circles around the scene centre.
 
     Attributes
     ----------
     rim_points : int
-        Number of evenly spaced points on a circle.
+        Number of evenly spaced points at which a circle is first evaluated.
     wide_fraction : float
-        Radius, as a fraction of the nearest slant range, above which a circle has twice as many points.
+        Radius, as a fraction of the shorter slant range, above which a circle has twice as many points.
     nearest_m : float
         Distance between a platform and a ground point below which there is no image. [m]
     crest_fraction : float
-        A search for a maximum ends when the computed value differs from the predicted crest of the cosine by less
-        than this fraction of the crest. The azimuth is then accurate to a degree.
+        Accuracy at which a search for a maximum ends. The search predicts the maximum as the crest of a cosine. It
+        ends when the computed value differs from this crest by at most this fraction of the crest. The azimuth is
+        then accurate to a degree.
     crest_error_fraction : float
-        Assumed error of a crest that is predicted from the points of a circle, as a fraction of the crest.
+        Assumed error of a maximum that is predicted from the evenly spaced points, as a fraction of the maximum.
     max_climb_rounds : int
         Largest number of rounds of a search for a maximum. Each round searches a quarter of the previous arc.
     narrow_clearance_ratio : float
-        A local minimum of the clearance is searched only if it is expected to be below this value.
+        Largest clearance, see `ScenePlaces`, that matters to the search. A local minimum of the clearance is searched
+        only if it is expected below this value.
     max_radius_fraction : float
-        Radius at which the search for a radius ends, as a fraction of the nearest slant range.
+        Largest radius to examine when searching for the radius within which one autofocus correction is sufficient,
+        as a fraction of the shorter slant range.
     radius_fraction : float
-        Tolerance of a radius, as a fraction of the radius.
+        Tolerance of the radius found by this search, as a fraction of the radius.
     similar_size_fraction : float
-        The radius found with first-order effects is kept if the largest difference there, for errors of any size,
-        deviates from the total by at most this fraction of the total.
+        Tolerance of the phase difference, as a fraction of the total budget. A radius found from first-order effects
+        is kept if the exact phase difference at this radius deviates from the budget by at most this tolerance.
     max_azimuth_rounds : int
-        Number of worst azimuths along which a radius is searched before the whole circle is searched.
+        Number of times that the radius is searched along the worst azimuth alone. If the circle found still has a
+        worse azimuth, the whole circle is evaluated at each radius.
     probe_count : int
         Number of azimuths at which the exact difference of a large error is compared with the first-order difference.
     small_phase_rad, small_phase_fraction : float
-        Deviation of an exact difference from the first-order difference up to which an error is treated as small: the
-        larger of this phase [rad] and this fraction of the largest difference on the circle.
+        Tolerance within which an error counts as small. It is the deviation of its exact phase difference from the
+        first-order difference. The larger of two values applies: this phase [rad], and this fraction of the largest
+        difference on the circle.
     azimuth_rad : float
-        Tolerance of the azimuth of a largest difference [rad]. The relative loss of a cosine is half the square of
-        it.
+        Tolerance δ of the azimuth of a largest difference. [rad] The difference varies as a cosine near its maximum,
+        so that a deviation of δ underestimates it by the fraction δ²/2.
     folding_fraction : float
-        Area spanned by the range and Doppler gradients, as a fraction of their area without an error, below which the
-        search looks for places without an image.
+        Area ratio, see `ScenePhases.around`, below which the search also looks for places without an image.
     cases_per_block, lanes_per_block : int
-        Numbers of cases, and of large errors at ground points, in one block of a computation, so that its arrays fit
-        into a cache.
+        Number of cases, and number of pairs of large error and place, in one block of a computation. The arrays of a
+        block fit into a processor's cache.
     """
 
     rim_points: int = 16
@@ -118,14 +124,15 @@ SizeAt = Callable[[Floats, Indices], Floats]  # combined differences at radii (n
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePlaces:
-    """Quadratic phases of errors and parts at places, and their combined difference from the scene centre.
+    """Quadratic phases of errors at places, their combined difference from the scene centre, and the clearance.
 
-    `phases` (errors and parts, places) are the quadratic phases. [rad] `size` (places,) is the difference from the
-    phases at the centre, combined over all errors by the mission's rule. [rad]
+    `phases` (errors and parts, places) are the quadratic phases. [rad] `size` (places,) is the difference between the
+    phases at the place and at the centre, combined over all errors by the mission's rule. [rad]
 
-    `clearance` (places,) is the sine of the angle between the directions that band and aperture resolve, divided by
-    the smallest sine that gives an image. A place has an image if its clearance is above 1. The clearance is positive
-    at the centre. It is negative if the two directions become parallel between the centre and the place.
+    `clearance` (places,) tells whether a place has an image, which is the case above 1. It is the sine of the angle
+    between the directions that band and aperture resolve, divided by the smallest sine that gives an image. The
+    clearance is positive at the centre. It is negative if the two directions are parallel at some point between the
+    centre and the place. It is 0 at a place that almost coincides with a platform.
     """
 
     phases: Floats
@@ -139,17 +146,20 @@ class ScenePlaces:
 
     @property
     def heights(self) -> Floats:
-        """Values that the search along circles maximises, (2, places): the negative of `clearance`, and `size`."""
+        """Values that the search along circles maximises, (2, places).
+
+        The first row is the negative of `clearance`, and the second row is `size`.
+        """
         return np.array((-self.clearance, self.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rims:
-    """Results on circles around scene centres: largest difference from the centre and its azimuth, (circles,). [rad]
+    """Largest phase differences between the points of circles and the scene centre, and their azimuths. [rad]
 
-    The differences are computed as if all errors were small. A difference is infinite if a part of its circle has no
-    image. `phases` (errors or parts, points, circles) are the quadratic phases at evenly spaced points of the
-    circles. [rad]
+    `difference` is the largest difference on each circle, and `azimuth` is where it occurs, (circles,) each. Both are
+    computed as if all errors were small. If a part of a circle has no image, its difference is infinite. `phases`
+    (errors and parts, points, circles) are the quadratic phases at evenly spaced points of the circles. [rad]
     """
 
     azimuth: Floats
@@ -165,9 +175,10 @@ Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
 
 
 class Heights(NamedTuple):
-    """Values found by a search along circles, such as combined phase differences, and their azimuths. [rad]
+    """Values found by a search along circles, and the azimuths where they occur. [rad]
 
-    If two values are equal, the one with the larger azimuth counts as higher.
+    The values are, for example, combined phase differences. If two values are equal, the value with the larger
+    azimuth counts as higher.
     """
 
     height: Floats
@@ -180,27 +191,28 @@ class Heights(NamedTuple):
         return Heights(height, np.where(self.height == height, self.azimuth, -math.inf).max(axis=0))
 
     def with_others(self, *candidates: "Heights") -> "Heights":
-        """Element-wise maximum of these values and the candidates, with the azimuths."""
+        """Return the element-wise maximum of these values and the candidates, with the azimuth of each maximum."""
         return Heights(*map(np.array, zip(self, *candidates, strict=True))).highest
 
     def of(self, indices: Selection) -> "Heights":
-        """Select the values with the given indices."""
+        """Select the values with the given indices, and their azimuths."""
         return Heights(self.height[indices], self.azimuth[indices])
 
     def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
-        """Return these values where `is_kept` is true, and the replacements elsewhere."""
+        """Return these values where `is_kept` is true, and the replacements elsewhere, with their azimuths."""
         return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
     def put(self, indices: Selection, heights: "Heights") -> None:
-        """Replace the values at the given indices."""
+        """Overwrite the values at the given indices, and their azimuths, with `heights`."""
         self.height[indices], self.azimuth[indices] = heights
 
 
 class ScenePhases:
-    """Quadratic phases of the declared errors at arbitrary places of the scenes.
+    """Quadratic phases of the declared errors at arbitrary ground points of the scenes, for many cases.
 
-    In all arrays, the first rows are the errors of motion and clocks (`members`), one row for each. They are followed
-    by the random errors, with one row for each of their parts (`scene_random`).
+    A place is a ground point of the scene in one of the cases. Most arrays have a first axis "errors and parts". It
+    holds first the errors of motion and clocks (`members`), then the independent parts of which the random errors are
+    composed (`scene_random`).
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError] = ()) -> None:
@@ -224,15 +236,23 @@ class ScenePhases:
         self.nearest = errors.array(np.minimum(transmitter.slant_range, receiver.slant_range))
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
-        """Exact ranges at places given by radius [m] and azimuth [rad]."""
+        """Compute the exact ranges at ground points given by radius [m] and azimuth [rad] from the scene centre.
+
+        `of` holds the index of the case for each ground point.
+        """
         return self.exact.at(*at(radius, azimuth), of)
 
     def places(self, radius: Floats, azimuth: Floats, of: Indices) -> ScenePlaces:
-        """Phases of the errors at ground points, combined differences from the centre, and clearances."""
+        """Compute the phases of the errors at ground points and their combined differences from the centre.
+
+        The result also tells whether each ground point has an image. The ground points (places) are given by radius
+        [m] and azimuth [rad] from the scene centre. `of` holds the index of the case for each of them. The effects of
+        all errors are taken to first order.
+        """
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
-        """Return the same result as `places`, from the exact ranges `there` of the places."""
+        """Compute the same result as `places` from the exact ranges at the places (`there`)."""
         centre = self.centre.take(of, axis=1)
         phases = self.random.there(there, of)
         if self.members:
@@ -246,10 +266,11 @@ class ScenePhases:
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
     def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
-        """Combine phases at places by the mission's rule, for all errors or for those with the given indices. [rad]
+        """Combine the phases of several errors at each ground point by the mission's rule, (places,). [rad]
 
-        `phases` (errors and parts, places) are signed. The phases of a covariance are combined with their
-        correlations.
+        `phases` (errors and parts, places) are signed. `of` holds the index of the case for each place. `indices`
+        selects the errors to combine. If it is omitted, all errors are combined. The phases of a covariance are
+        combined according to their correlations.
         """
         phases_of_errors = self.of_errors(phases)
         if indices is None and not self.groups:
@@ -260,30 +281,34 @@ class ScenePhases:
         return np.asarray(np.broadcast_to(total, phases.shape[1:]))
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Phase of each error, (errors, ...), from the phases of errors and parts, (errors and parts, ...). [rad]
+        """Combine the parts of each random error, to give one phase for each error. [rad]
 
-        The phase of a random error is its sigma, computed from its parts.
+        `phases` is (errors and parts, ...), and the result is (errors, ...). The phase of a random error is the sigma
+        that follows from its parts.
         """
         count = len(self.members)
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
-        """Phase of each error or part at places less its phase at the centre, (errors and parts, places). [rad]
+        """Phase of each error or part at ground points minus its phase at the scene centre. [rad]
 
-        For a large error it is the difference for the worse sign of the error.
+        The result is (errors and parts, places). The places are given by radius [m] and azimuth [rad] from the
+        centre. For a large error, whose effects are not proportional to its size, the result is the exact difference
+        for the worse sign of the error.
         """
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """Phase differences from the centre, to first order and by exact ranges, and the smallest area ratios.
+        """Compute phase differences between ground points and the scene centre, and ratios that show a lost image.
 
-        Returns three arrays. The first, (errors, places), holds the first-order differences. [rad] The second is
-        equal to the first, except that the differences of the errors marked in `exact` (errors, places) follow from
-        exact ranges. [rad]
+        Returns three arrays. The first is (errors and parts, places) and holds the first-order phase differences.
+        [rad] The second has the same shape. In it, the differences of the errors marked in `exact` follow from exact
+        ranges. [rad] `exact` is (errors and parts, places).
 
-        The third, (places,), is the smallest area ratio of the errors marked in `exact`. The area ratio of an error
-        is the area that the range and Doppler gradients span at the point to which the error moves the image, divided
-        by the area without the error. It is 0 where there is no image.
+        The third array is (places,) and holds the smallest area ratio of all errors marked in `exact`. The area ratio
+        of an error is the area that the range and Doppler gradients span with the error, divided by the area that
+        they span without it. With the error, it is the area at the point to which the error moves the image. The
+        ratio is 0 where there is no image. It is infinite where no error is marked.
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
@@ -297,7 +322,10 @@ class ScenePhases:
     def _exactly(
         self, there: ExactRanges, of: Indices, error: Indices, point: Indices, kept: tuple[Floats, Floats]
     ) -> None:
-        """Replace differences and area ratios in `kept`, for pairs of an error and a place, by exact results."""
+        """Replace phase differences by the results of exact ranges, for given pairs of error and place.
+
+        `kept` holds the phase differences and the smallest area ratios of `around`, and both are updated in place.
+        `error` and `point` hold the indices of the error and of the place of each pair."""
         (differences, turns), case, count = kept, of[point], error.size
         lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
         lanes = replace(lanes, case=np.tile(point, 2))
@@ -314,22 +342,31 @@ class ScenePhases:
 
     @cached_property
     def _rows(self) -> Indices:
-        """Index of the block of lanes of each large error and sign in `_lanes`, (2, errors).
+        """Index of the block of lanes in `_lanes` for each sign of each large error, (2, errors and parts).
 
-        A block has one lane, which is one error of one sign in one case, for each case.
+        A lane is one error with one sign in one case. A block holds the lanes of all cases for one error with one
+        sign. The indices of errors that are large in no case have no meaning. An error is large if its effects are
+        not proportional to its size.
         """
         lane = np.cumsum(self.is_large.any(axis=1)) - 1
         return np.array((2 * lane, 2 * lane + 1))
 
     @cached_property
     def _lanes(self) -> Lanes:
-        """Lanes of the errors that are large in any case: both signs of each error, in all cases."""
+        """Lanes of the errors that are large in at least one case, with both signs and in all cases.
+
+        A lane is one error with one sign in one case. The effects of a large error are not proportional to its
+        size."""
         large = np.flatnonzero(self.is_large.any(axis=1))
         return self.errors.lanes(*(self.members[i] for i in large), signs=(1.0, -1.0))
 
     @cached_property
     def _by_sign(self) -> Floats:
-        """Quadratic phases of the large errors at the centre for each sign, (2, errors, cases). [rad]"""
+        """Quadratic phases of the large errors at the scene centre for each sign. [rad]
+
+        The result is (2, errors and parts, cases). It is NaN for errors that are large in no case. An error is large
+        if its effects are not proportional to its size.
+        """
         phases = np.full((2, *self.is_large.shape), math.nan)
         for i in np.flatnonzero(self.is_large.any(axis=1)):
             phases[:, i] = self.errors.quadratic_by_sign(self.members[i])
@@ -337,9 +374,10 @@ class ScenePhases:
 
     @cached_property
     def more(self) -> Floats:
-        """Exact less first-order quadratic phase at the centre, (errors and parts, cases). [rad]
+        """Exact quadratic phase at the scene centre minus the first-order phase, (errors and parts, cases). [rad]
 
-        The exact phase is that for the worse sign of the error. The value is 0 for errors that are not large.
+        The exact phase is that for the worse sign of the error. The value is 0 for an error that is not large.
+        An error is large if its effects are not proportional to its size.
         """
         exactly = self.centre.copy()
         for index, error in enumerate(self.members):
@@ -348,15 +386,19 @@ class ScenePhases:
 
     # ------------------------------------------------------------------ circles
     def points(self, radius: Floats, of: Indices) -> Indices:
-        """Number of evenly spaced points at which a circle of the given radius [m] needs to be evaluated."""
+        """Number of evenly spaced points at which circles of given radii [m] must be evaluated, (circles,).
+
+        `of` holds the index of the case for each circle.
+        """
         return np.where(radius <= _SCENE.wide_fraction * self.nearest[of], _SCENE.rim_points, 2 * _SCENE.rim_points)
 
     def rims(self, radius: Floats, of: Indices) -> Rims:
-        """Evaluate circles at evenly spaced points and around their worst points.
+        """Find the largest phase difference from the scene centre on each circle, with first-order effects.
 
-        All circles must need the same number of evenly spaced points. The worst point of a circle is the point with
-        the largest difference. If the smallest clearance comes close to 1, its surroundings are searched too. There
-        the difference grows as the inverse of the clearance, within an arc that the evenly spaced points may miss.
+        Each circle is evaluated at evenly spaced points and searched near the points with the largest differences.
+        All circles must need the same number of evenly spaced points, see `points`. Where the clearance (see
+        `ScenePlaces`) has a small minimum, its surroundings are searched too. There the difference grows as the
+        inverse of the clearance, within an arc that the evenly spaced points may miss.
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
@@ -388,22 +430,23 @@ def at(radius: float, azimuth: float) -> tuple[float, float]: ...
 @overload
 def at(radius: Floats, azimuth: Floats) -> tuple[Floats, Floats]: ...
 def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
-    """Ground point at a radius [m] and azimuth [rad] from the scene centre, east and north. [m]"""
+    """Return the ground point, east and north [m], at a radius [m] and azimuth [rad] from the scene centre."""
     return radius * np.cos(azimuth), radius * np.sin(azimuth)
 
 
 # ---------------------------------------------------------------------- climbs
 def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[Heights, Heights]:
-    """Search for the local maxima of values on circles, starting from points that are above their neighbours.
+    """Find the local minima of the clearance and the local maxima of the phase difference on circles.
 
-    `heights` (2, points, circles) are the negative clearances and the sizes at evenly spaced points. `look` returns
-    both at given azimuths of given circles. Returns the maxima of the negative clearances and the maxima of the
-    sizes, (points, circles) each. A value is minus infinity where no search started.
+    `heights` (2, points, circles) are the negative clearances and the sizes at evenly spaced points. The sizes are
+    combined phase differences, see `ScenePlaces`. `look` returns both at given azimuths of given circles. The
+    function returns the maxima of the negative clearances and the maxima of the sizes, (points, circles) each. A
+    value is minus infinity where no search started or where its result is not needed.
 
-    Two kinds of starting points are left out: clearances that are not expected to fall below
-    `narrow_clearance_ratio`, and sizes that are expected to stay below the highest size by more than the error of a
-    predicted crest. All other minima of the clearance are searched, not only the lowest, because the true minimum
-    between the evenly spaced points may be beside a higher one.
+    A search starts from each point whose value is at least as high as at both neighbours. Clearances that are not
+    expected to fall below `narrow_clearance_ratio` are left out. Sizes are left out if they are expected to stay
+    below the highest size, or if a point of their circle has no image. All minima of the clearance that remain are
+    searched, because the lowest minimum of the circle may be next to a point that is not the lowest.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
@@ -431,11 +474,13 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
 
 def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
-    """Search for the maximum near each starting point, whose neighbours at a distance `arc` are not higher.
+    """Search for the maximum near each starting point on a circle.
 
-    `sides` are the values at both neighbours. To first order in the radius, a value is a constant plus a cosine of
-    the azimuth. If the value computed at the predicted crest of this cosine differs from the prediction, the search
-    is repeated in a quarter of the arc.
+    `start` holds the values and azimuths of the starting points. `sides` are the values at an angle `arc` [rad] on
+    both sides of each starting point, and they are not higher. `height_at` computes values at given azimuths. To
+    first order in the radius, a value is a constant plus a cosine of the azimuth. The search predicts the crest of
+    this cosine. If the value computed there differs from the prediction, the search is repeated in a quarter of the
+    arc.
     """
     best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(_SCENE.max_climb_rounds):
@@ -457,9 +502,10 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
 
 
 def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
-    """Crest of the cosine through three points on a circle that are `arc` apart [rad].
+    """Find the crest of the cosine through three points of a circle whose azimuths are `arc` [rad] apart.
 
-    Returns the offset of the crest from the middle point [rad], limited to ±`arc`, and the value at the crest.
+    Returns two arrays. The first is the azimuth of the crest minus that of the middle point, limited to ±`arc`. [rad]
+    The second is the value at the crest.
     """
     sine = (after - before) / (2 * math.sin(arc))
     cosine = (middle - (after + before) / 2) / (1 - math.cos(arc))
@@ -468,10 +514,10 @@ def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[F
 
 
 class _Climb:
-    """Search for the largest differences on circles, for errors of any size.
+    """Search for the largest phase differences from the scene centre on circles, for errors of any size.
 
-    The search on a circle starts from the azimuth with the highest value. The azimuths compared are evenly spaced
-    ones and the azimuth where the difference is largest for small errors.
+    On each circle, the difference is first computed at evenly spaced azimuths, and at the azimuth where it is largest
+    for small errors. The search starts from the azimuth with the largest difference.
     """
 
     def __init__(self, phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> None:
@@ -483,9 +529,9 @@ class _Climb:
         )  # negative area ratios and negative azimuths
 
     def largest(self) -> Heights:
-        """Largest differences on the circles, with their azimuths. [rad]
+        """Find the largest phase difference from the scene centre on each circle, with its azimuth. [rad]
 
-        A difference is infinite if a part of the circle has no image.
+        The difference is infinite if a part of the circle has no image.
         """
         azimuth, bent_circles = self.rims.azimuth.copy(), np.flatnonzero(self.bent.any(axis=0))
         if bent_circles.size:
@@ -494,9 +540,10 @@ class _Climb:
         return Heights(self.phases.together(differences, self.of), azimuth)
 
     def _bent(self) -> Booleans:
-        """Mark the large errors whose exact differences deviate from the first-order differences on a circle.
+        """Mark the large errors whose exact phase differences on a circle deviate from the first-order differences.
 
-        The differences are compared at three azimuths, which reveal two harmonics.
+        The result is (errors and parts, circles). An error is large if its effects are not proportional to its size.
+        The differences are compared at three azimuths, which suffice to detect two harmonics over the azimuth.
         """
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
@@ -512,9 +559,10 @@ class _Climb:
         return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
     def _look(self, circles: Indices, azimuths: Floats) -> Heights:
-        """Largest combined difference of each circle among given azimuths (n, circles), with its azimuth. [rad]
+        """Find the largest combined phase difference of each circle among given azimuths, with its azimuth. [rad]
 
-        `lowest` keeps the smallest area ratio (see `ScenePhases.around`) that was found so far on each circle.
+        `azimuths` is (n, circles). The method also updates `lowest`, which holds the smallest area ratio found so far
+        on each circle, see `ScenePhases.around`.
         """
         count = len(azimuths)
         of, bent = np.tile(self.of[circles], count), np.tile(self.bent[:, circles], count)
@@ -526,11 +574,11 @@ class _Climb:
         return Heights(self.phases.together(differences, of).reshape(count, -1), azimuths).highest
 
     def _azimuths(self, circles: Indices) -> Floats:
-        """Azimuths of the largest differences, or of places without an image. [rad]
+        """Find the azimuth of the largest difference on each circle, or of a place without an image. [rad]
 
-        The errors marked in `bent` are computed by exact ranges. The image ends where the gradients become parallel.
-        This may happen on an arc between the azimuths examined, so the search also runs towards the azimuth where the
-        gradients are nearest to parallel.
+        The effects of the errors marked in `bent` are computed by exact ranges. Where the range and Doppler gradients
+        are parallel, there is no image. Such places may lie on a short arc between the examined azimuths. The search
+        therefore also runs towards the azimuth where the gradients are nearest to parallel.
         """
         even = np.broadcast_to(2 * _ARC * np.arange(_SCENE.rim_points)[:, None], (_SCENE.rim_points, circles.size))
         top = self._look(circles, np.concatenate((self.rims.azimuth[circles][None], even)))
@@ -562,11 +610,11 @@ class _Climb:
 def differences_at(
     errors: DeclaredErrors, radius: float, azimuth: float, random: Sequence[RandomError] = ()
 ) -> list[tuple[str, float]]:
-    """Phase of each error at a place less its phase at the centre, as pairs of row id and phase. [rad]
+    """List the quadratic phase of each error at a ground point minus its phase at the scene centre. [rad]
 
-    `errors` have a single case. The place is given by its radius [m] and azimuth [rad] from the scene centre.
-
-    The errors are in the order of the file. The value of a random error is its sigma, coverage factor included.
+    Each item is a pair of row id and phase difference. `errors` must have a single case. The ground point is given by
+    its radius [m] and azimuth [rad] from the scene centre. Errors of motion and clocks come first, then random
+    errors, then slow vibrations. For a random error the difference is a sigma that includes the coverage factor.
     """
     phases = ScenePhases(errors, random)
     differences = phases.of_errors(
@@ -578,13 +626,17 @@ def differences_at(
 # ---------------------------------------------------------------------- edges
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneEdges:
-    """Changes of the phases from the centres to the edges of the scenes, for many cases. [rad]
+    """Changes of the quadratic phases from the centres to the edges of the scenes, for many cases.
 
-    `rim` holds the largest combined difference from the centre, and its azimuth, as if all errors were small.
-    `largest` holds the same for the declared sizes. Both combine the errors by the mission's rule, and are infinite
-    where there is no image. `names` are the errors, or the sums of errors, that have a `limit` (names, cases). `over`
-    (names, cases) is the phase at the edge where it exceeds the limit although the phase at the centre meets it, and
-    0 elsewhere.
+    `phases` computes the phases at any ground point. `radius` (cases,) is the radius of the scene's edge. [m]
+
+    `rim` holds the largest phase difference from the centre, and its azimuth, as if all errors were small. [rad]
+    `largest` holds the same for the declared sizes of the errors. [rad] In both, the errors are combined by the
+    mission's rule. The differences are infinite if a part of the edge has no image.
+
+    `names` are the ids of the errors, or of the sums of errors, that are judged at the edge. `limit` (names, cases)
+    is the limit of each phase. [rad] `over` (names, cases) is the phase at the edge if it exceeds the limit although
+    the phase at the centre meets it. Otherwise it is 0. [rad]
     """
 
     phases: ScenePhases
@@ -597,19 +649,22 @@ class SceneEdges:
 
     @property
     def difference(self) -> Floats:
-        """Largest combined difference of the phases between edge and centre, (cases,). [rad]"""
+        """Largest combined phase difference between the edge and the centre of the scene, (cases,). [rad]
+
+        It is infinite if a part of the edge has no image.
+        """
         return self.largest.height
 
     @property
     def has_doubt(self) -> Booleans:
-        """Cases in which an error or a sum exceeds its limit at the edge, but not at the centre."""
+        """Whether an error or a sum of errors exceeds its limit at the edge but not at the centre, (cases,)."""
         return np.asarray((self.over > 0).any(axis=0))
 
 
 def scene_edges(
     errors: DeclaredErrors, random: Sequence[RandomError], limits: Mapping[str, Floats], split: Shares
 ) -> SceneEdges | None:
-    """Evaluate the errors of many cases at the edges of their scenes.
+    """Evaluate the quadratic phases of the declared errors at the edges of the scenes, for many cases.
 
     Returns None if no error is declared.
 
@@ -618,11 +673,12 @@ def scene_edges(
     errors : DeclaredErrors
         Errors of missions that state `scene.radius`.
     random : sequence of RandomError
-        Random errors of the same missions, declared or not.
+        Random errors of the same missions. Errors without a declared size are ignored.
     limits : mapping of str to (cases,)
-        Limit of the phase of each owner, autofocus gain included. [rad]
+        Limit of the quadratic phase of each owner, autofocus gain included. [rad] An owner is a platform, the clock
+        or the whole mission.
     split : Shares
-        Division of the budget, which determines the errors that count against each limit.
+        Division of the budget. It determines which errors count against each limit.
     """
     phases = ScenePhases(errors, random)
     if not phases.ids:
@@ -666,7 +722,11 @@ def _evaluate(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices) 
 
 
 def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> Heights:
-    """Largest phase difference from the centre on each circle, and its azimuth, for errors of any size. [rad]"""
+    """Find the largest phase difference from the scene centre on each circle, for errors of any size. [rad]
+
+    The result holds the difference and its azimuth. `rims` are the results for small errors on the same circles. `of`
+    holds the index of the case for each circle.
+    """
     largest = Heights(rims.difference.copy(), rims.azimuth.copy())
     large_circles = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
     if large_circles.size:
@@ -677,15 +737,19 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
-    """Combined phases that exceed their limits at the edge but not at the centre, (names, cases in `of`). [rad]
+    """Combined phases at the scene's edge that exceed limits which they meet at the centre. [rad]
 
-    The value is 0 for all others.
+    The result is (names, cases in `of`). It is 0 where the phase meets its limit at the edge, or exceeds it at the
+    centre already. `members` holds, for each name, the indices of the errors that its phase combines.
     """
     phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
     def combined_phases(at_points: Floats) -> Floats:
-        """Phases that are compared with the limits: of each error under `each`, otherwise of each sum. [rad]"""
+        """Phases that are compared with the limits, (names, ...). [rad]
+
+        Under the rule `each` they are the magnitudes of the phases of single errors. Under the other rules they are
+        the combined phases of sums of errors. `at_points` is (errors and parts, ...)."""
         if phases.combine == "each":
             return np.abs(phases.of_errors(at_points))
         return np.array([phases.together(at_points, of, indices) for indices in members])
@@ -702,9 +766,9 @@ def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: I
 
 # ---------------------------------------------------------------------- one correction
 class Corrections:
-    """Distance from the scene centre within which one autofocus correction is sufficient.
+    """Search for the distance from the scene centre within which a single autofocus correction is sufficient.
 
-    Within this distance, the differences of the phases from the centre stay within `total`. [rad]
+    Within this distance, the combined phase difference from the centre stays within the budget `total`. [rad]
 
     Attributes
     ----------
@@ -718,9 +782,11 @@ class Corrections:
 
     @cached_property
     def served(self) -> Floats:
-        """Radius at which the largest difference reaches the total, (cases,). [m]
+        """Radius up to which a single autofocus correction is sufficient, (cases,). [m]
 
-        Infinite if the difference stays within the total up to `farthest`. NaN if the edge has no image.
+        At this radius the largest phase difference from the centre reaches the budget `total`. The radius is infinite
+        if the difference stays within the budget up to `farthest`. It is NaN if a part of the scene's edge has no
+        image.
         """
         radii = np.full(self.total.shape, math.nan)
         cases = np.flatnonzero(np.isfinite(self.edges.rim.height) & np.isfinite(self.edges.difference))
@@ -750,9 +816,10 @@ class Corrections:
         return radii
 
     def _served_of_small(self, of: Indices) -> Floats:
-        """Return the radii of `served` if the effects of all errors were proportional to their sizes. [m]
+        """Find the radii of `served` under the assumption that the effects of all errors are of first order. [m]
 
-        The search runs along the worst azimuth. It is repeated if the rim at the radius found has a worse azimuth.
+        The search runs along the worst azimuth at the scene's edge. It is repeated if the circle with the radius
+        found has a worse azimuth. After `max_azimuth_rounds` searches, the whole circle is evaluated at each radius.
         """
         total, high, radii = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
         size, azimuth = self.edges.rim.of(of)
@@ -786,7 +853,11 @@ class Corrections:
     def _grow(
         self, size_at: SizeAt, of: Indices, searched: Indices, low: Floats, below: Floats, high: Floats, size: Floats
     ) -> None:
-        """Increase the radii [m] in place until the size exceeds the total, or until `farthest` is reached."""
+        """Increase radii until the phase difference exceeds the budget `total`, or until `farthest` is reached.
+
+        `high` are these radii [m], and `size` are the phase differences at these radii [rad]. `low` and `below`
+        receive the previous radii and differences. All four arrays are updated in place. `size_at` computes the
+        differences, and `searched` selects the cases."""
         total, farthest = self.total[of], self.farthest[of]
         while True:
             searched = searched[(size[searched] <= total[searched]) & (high[searched] < farthest[searched])]
@@ -798,10 +869,11 @@ class Corrections:
             size[searched] = size_at(high[searched], searched)
 
     def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
-        """Largest differences on circles with their azimuths. [rad]
+        """Find the largest phase difference from the scene centre on each circle, with its azimuth. [rad]
 
-        If `of_small` is true, the effects of all errors are taken to first order; otherwise they are those of any
-        size.
+        The circles have the given radii [m], and `of` holds the index of the case for each circle. If `of_small` is
+        true, the effects of all errors are taken to first order. Otherwise the effects of large errors are exact.
+        An error is large if its effects are not proportional to its size.
         """
         largest, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
@@ -819,19 +891,21 @@ def where(
     inside: tuple[Floats, Floats],
     outside: tuple[Floats, Floats],
 ) -> Floats:
-    """Find the radii up to which sizes stay within a total, to a thousandth, by the Illinois secant method.
+    """Find the radii up to which phase differences stay within a limit, by the Illinois secant method. [m]
+
+    The radii are accurate to a thousandth (`radius_fraction`). The result is (searched,).
 
     Parameters
     ----------
     size_at : callable
-        Function of radii (searched,) and the indices of their cases (searched,) that returns sizes.
+        Function that returns combined phase differences [rad] for given radii [m] and the indices of their cases.
     total : (n,)
-        Limit of the sizes.
+        Limit of the phase differences in each of the n cases. [rad]
     searched : (searched,)
-        Indices, out of n, of the cases to search.
+        Indices of the cases to search.
     inside, outside : pairs of (n,)
-        Radius with its size, at which the size is within the total (`inside`) or exceeds it (`outside`). The solution
-        lies between the two radii.
+        Two pairs of radius [m] and phase difference [rad]. At the radius in `inside` the difference is within the
+        limit, and at the radius in `outside` it exceeds the limit. The solution lies between the two radii.
     """
     (low, below), (high, above) = ([values[searched].copy() for values in pair] for pair in (inside, outside))
     slack = total[searched] * _SCENE.radius_fraction / 2
@@ -860,12 +934,15 @@ def where(
 
 # ---------------------------------------------------------------------- in words
 class SceneEdge(NamedTuple):
-    """Largest change of the quadratic phase from the scene centre to the edge of one mission's scene, with notes.
+    """Largest change of the quadratic phase from the centre to the edge of a mission's scene, with notes on it.
 
-    `difference` is this change [rad], combined by the mission's rule, at `azimuth` on the rim. `autofocus_radius` is
-    the radius within which the change stays within the total budget. [m] It is None if the change stays within the
-    budget up to the radius `searched`. [m] `degeneracy` is the reason why a part of the edge has no image. `doubt`
-    names an error that exceeds its limit at the edge, but not at the centre.
+    `radius` is the radius of the edge. [m] `difference` is the largest change of the phase, combined over all errors
+    by the mission's rule. [rad] It occurs at `azimuth` on the edge. [rad] `difference` is NaN if a part of the edge
+    has no image, and `degeneracy` then gives the reason.
+
+    Up to `autofocus_radius` the change stays within the total budget. [m] This radius is None if the change stays
+    within the budget up to `searched`, the largest radius that was examined. [m] `doubt` names an error or a sum of
+    errors that exceeds its limit at the edge, but not at the centre. `degeneracy` and `doubt` may be empty.
     """
 
     radius: float
@@ -878,7 +955,10 @@ class SceneEdge(NamedTuple):
 
     @classmethod
     def of(cls, corrections: Corrections, mission: Mission, case: int = 0) -> "SceneEdge":
-        """Create the scene edge of one case, given the mission of that case."""
+        """Create the scene edge of one case from the results for many cases.
+
+        `mission` is the mission of this case, and `case` its index in `corrections`.
+        """
         edges = corrections.edges
         (size, rim), (difference, azimuth) = (map(float, heights.of(case)) for heights in (edges.rim, edges.largest))
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
@@ -900,7 +980,10 @@ class SceneEdge(NamedTuple):
         return cls(radius, difference, azimuth, within, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
-        """Notes on the azimuth of the largest difference and the radius that one autofocus correction covers."""
+        """Notes on the azimuth of the largest change and on the radius that one autofocus correction covers.
+
+        `total` is the total budget of the quadratic phase. [rad] If there is no change, a single note states this.
+        """
         if not self.difference:
             return (phrases.note("same-at-the-edge"),)
         largest = phrases.note("largest-at-the-edge", azimuth_deg=math.degrees(self.azimuth), radius=self.radius)
@@ -908,14 +991,17 @@ class SceneEdge(NamedTuple):
 
     @property
     def served(self) -> str:
-        """Text that gives the radius within which one autofocus correction is sufficient."""
+        """Text on the radius within which a single autofocus correction is sufficient."""
         if self.autofocus_radius is None:
             return f"beyond the scene ({format_quantity(self.searched, 'm', 3, 'down')})"
         return f"up to {format_quantity(self.autofocus_radius, 'm', 3, 'down')} from the centre"
 
 
 def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
-    """Reason why a ground point has no image."""
+    """Reason why a ground point has no image, as text.
+
+    `ground_point` is given east and north of the scene centre. [m]
+    """
     (east, north), geometry = ground_point, mission.geometry
     transmitter, receiver = (
         replace(state, position=(state.position[0] - east, state.position[1] - north, state.position[2]))

@@ -1,23 +1,24 @@
-"""Quadratic phases of errors without a sign at places of a scene: sensors, clocks, air and slow vibrations.
+"""Quadratic phases of random errors at any ground point of a scene.
 
-A random error is a sum of independent parts. The variation of each part over the aperture is known, while its size is
-random. A part is, for example, the bias along one axis, or one order of the noise along one axis. During one
-collection, a part has the same size at all places of the scene. The difference of the error between two places is
-therefore the root-sum-square of the differences of its parts. The difference of the two root-sum-squares would be too
-small.
+The random errors are errors of sensors, clocks and air, and slow vibrations. Each is a sum of independent parts. The
+variation of a part over the aperture is known, while its size is random. A part is, for example, the bias along one
+axis, or one Legendre order of the noise along one axis. During a collection, a part has the same size for all ground
+points of the scene. The phases that a random error causes at two ground points therefore differ by the
+root-sum-square of the differences of its parts. The difference between the root-sum-squares at the two points would
+be too small.
 
-- An error that moves a platform is projected on the line of sight from each place.
-- A clock error moves no platform. The phase at a place is the phase at the centre plus a phase that the constant and
-  the linear term of the range error add, because their displacement differs at this place. These terms are those
-  that cause the displacement at the centre. Terms that the file leaves open, as for a free oscillator, are left out,
-  and the report contains a note on that.
-- A zenith delay is the same for the whole scene, and each place has its own elevation of the leg. A delay that
-  changes within the aperture consists of as many independent parts as its correlation requires.
-- A slow vibration has an unknown phase. Its cosine and sine are parts of the same size, and the worst phase is the
-  root-sum-square of both. The axes may vibrate in any phase, so their effects add. A vibration stated along the line
-  of sight moves the platform along the line of sight of the centre.
+- An error that moves a platform is projected on the line of sight from each ground point.
+- A clock error moves no platform. The constant and the linear term of its range error displace the image, and this
+  displacement depends on the ground point. The phase at a ground point is therefore the phase at the centre plus a
+  phase due to these two terms. The two terms are computed from the displacement at the centre. Terms that the mission
+  file does not determine, as for a free oscillator, are left out. The report then contains a note on this.
+- A zenith delay is the same for the whole scene, but the elevation of a platform depends on the ground point. A delay
+  that changes within the aperture consists of as many independent parts as its correlation requires.
+- A slow vibration has an unknown phase. Its cosine and its sine are two parts of the same size. The effect in the
+  worst phase is the root-sum-square of the effects of both. The axes may vibrate in any phase, so their effects add.
+  A vibration stated along the line of sight moves the platform along the line of sight to the scene centre.
 
-An error that is stated only by its effect has this effect at every place of the scene. Derived here.
+An error that the mission file states only by its effect has this effect at every ground point. Derived here.
 `tests/simulate/test_random_at_scene_edge.py` checks it against exact ranges.
 """
 
@@ -53,14 +54,16 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class RandomPhases:
-    """Declared errors without a sign, for many cases, at arbitrary places of their scenes.
+    """Quadratic phases of declared random errors and slow vibrations at arbitrary ground points, for many cases.
+
+    A random error is a sum of independent parts. A place is a ground point in one of the cases.
 
     Attributes
     ----------
     subjects : list of Subject
-        Subjects of the errors.
+        Subject of each error, with the id and the owner of its row.
     centre : (parts, cases)
-        Quadratic phases of the parts of all errors at the scene centre. [rad]
+        Quadratic phases at the scene centre due to the parts of all errors. [rad]
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError]) -> None:
@@ -74,14 +77,17 @@ class RandomPhases:
         self._first_rows, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phases of the parts of all errors at places, (parts, places). [rad]
+        """Quadratic phases at ground points (places) due to the parts of all errors, (parts, places). [rad]
 
-        The argument `there` gives the exact ranges at the places, and `of` the index of the case of each place.
+        The argument `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
         """
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Phase of each error, (errors, ...), from the phases of its parts, (parts, ...). [rad]"""
+        """Combine the phases of the parts of each error to the phase of the error. [rad]
+
+        `phases` is (parts, ...), and the result is (errors, ...).
+        """
         if not self._errors:
             return phases
         of_groups = np.sqrt(np.add.reduceat(np.square(phases), self._first_rows, axis=0))
@@ -92,7 +98,9 @@ class RandomPhases:
 class _Moving(NamedTuple):
     """Random error of the motion of one or both platforms.
 
-    Its parts form `groups`. The parts of a group are combined as a root-sum-square, and the groups are then added.
+    `moves` are the motions due to one unit of the error, and `size` is the size of the error in this unit. `groups`
+    is the number of groups into which the parts of the error are divided. The phases in a group are combined as a
+    root-sum-square, and the results of all groups are added.
     """
 
     moves: Sequence[Moves]
@@ -100,7 +108,10 @@ class _Moving(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase of each direction and variation of the motion, (parts, places). [rad]"""
+        """Quadratic phase at ground points (places) due to each part of the error, (parts, places). [rad]
+
+        A part is a motion along a single direction with a single variation over the aperture. `there` gives the exact
+        ranges at the places. `of` holds the index of the case for each place."""
         weights, (total, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
         for motion in self.moves:
             ways, courses = _of(motion.ways, of), _of(motion.courses, of)
@@ -113,11 +124,12 @@ class _Moving(NamedTuple):
 
 
 class _Clock(NamedTuple):
-    """A clock error as independent parts, (parts, cases) each.
+    """Clock error, divided into independent parts.
 
-    `quadratic` is the quadratic phase at the scene centre [rad]; `constant` [m] and `linear` [m/s] are the terms of
-    the range error. `at_centre` (2, cases) is the phase at the centre that one metre and one metre per second of
-    these terms add. [rad]
+    `quadratic` is the quadratic phase at the scene centre due to each part. [rad] `constant` [m] and `linear` [m/s]
+    are the constant and the linear term of the range error due to each part. These three arrays are (parts, cases).
+    `at_centre` (2, cases) is the quadratic phase at the centre due to a constant term of 1 m, and due to a linear
+    term of 1 m/s. [rad]
     """
 
     quadratic: Floats
@@ -128,10 +140,11 @@ class _Clock(NamedTuple):
 
     @classmethod
     def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
-        """Create the clock error from its covariance at the scene centre, (4, 4, cases), and its declared size.
+        """Create a clock error from its declared size and the covariance of its effects at the scene centre.
 
-        The covariance is that of `RandomEffect`, for one unit of the error: quadratic phase, cubic phase, and
-        displacement east and north. `size` (cases,) is in the same unit.
+        `covariance` (4, 4, cases) is the covariance in `RandomEffect` for one unit of the error. The four effects are
+        quadratic phase, cubic phase, displacement east, and displacement north. `size` (cases,) is in the unit of the
+        error.
         """
         joint = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
         quadratic, east, north = np.moveaxis(factor(np.moveaxis(joint, 2, 0)), 0, 2) * size
@@ -142,7 +155,10 @@ class _Clock(NamedTuple):
         return cls(quadratic, constant, linear, _terms(exact.phase_weights, exact)[0])
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase of each part at places, (parts, places). [rad]"""
+        """Quadratic phase at ground points (places) due to each part of the clock error, (parts, places). [rad]
+
+        `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
+        """
         by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
         quadratic, constant, linear = (term[:, of] for term in self[:3])
         return np.asarray(quadratic + by_constant * constant + by_linear * linear)
@@ -151,16 +167,19 @@ class _Clock(NamedTuple):
 def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
     """Effects of a constant range error of 1 m, and of a linear range error of 1 m/s, (effects, 2, cases).
 
-    Each row of `weights` gives one effect per metre of range error at each node.
+    `weights` has an array (nodes, cases) for each effect. The array gives the effect per metre of range error at each
+    node.
     """
     return np.array([[row.sum(axis=0), (row * exact.times).sum(axis=0)] for row in weights])
 
 
 class _Delay(NamedTuple):
-    """Delay of the air on the leg of one platform or on both legs, stated in metres at the zenith.
+    """Error of the propagation delay in air, on the path between the scene and one or both platforms.
 
-    `middles` are the positions of the platforms at mid-aperture relative to the scene centre. [m] `courses` (courses,
-    nodes, cases) are independent variations over the aperture, which together make up a zenith delay of variance 1.
+    `delay` is the kind of delay, and `metres` is its size at the zenith. [m] `middles` are the positions of the
+    platforms at mid-aperture relative to the scene centre. [m] `courses` (courses, nodes, cases) are independent
+    variations over the aperture. If each is multiplied by an independent random number of variance 1, their sum is a
+    zenith delay of variance 1.
     """
 
     platform_indices: tuple[int, ...]
@@ -171,7 +190,10 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase at scene places due to each independent variation of the delay, (courses, places). [rad]"""
+        """Quadratic phase at ground points (places) due to each variation in `courses`, (courses, places). [rad]
+
+        `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
+        """
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):
             x, y, z = (component[of] for component in middle)
@@ -214,7 +236,7 @@ def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
 
 
 def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
-    """Interpolate motions of platforms to the nodes at which the declared errors are sampled."""
+    """Interpolate motions of platforms from the aperture nodes of `moves` to the nodes used for declared errors."""
     resampled = []
     for motion in moves:
         between = _between(motion.courses.shape[1], errors.exact.fit.shape[1])
@@ -225,9 +247,9 @@ def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
-    """Matrix (count, sensed) that interpolates from `sensed` nodes of the sensors to `count` other nodes.
+    """Matrix (count, sensed) that interpolates values at `sensed` quadrature nodes of the aperture to `count` nodes.
 
-    It uses the Legendre orders that both sets of nodes resolve.
+    The interpolation uses the Legendre polynomials up to the highest order that both sets of nodes resolve.
     """
     node_times, weights = np.polynomial.legendre.leggauss(sensed)
     order = np.arange(min(sensed, count))
@@ -236,5 +258,8 @@ def _between(sensed: int, count: int) -> Floats:
 
 
 def _of(array: Floats, cases: Indices) -> Floats:
-    """Select some cases of an array (…, cases). A last axis of length 1, shared by all cases, stays as it is."""
+    """Select cases along the last axis of an array (…, cases).
+
+    A last axis of length 1 is shared by all cases and is not changed.
+    """
     return array if array.shape[-1] == 1 else array.take(cases, axis=-1)

@@ -1,12 +1,14 @@
-"""Phases that cause echoes or spread energy over the image: tones, noise, and cubic phase without a requirement.
+"""Phases that cause echoes or spread energy over the image: tones, noise, and cubic phases.
 
-Independent powers add, even if `allocation.combine` sets another rule for phases. Each effect is judged once. A tone
-counts against PSLR or, without a requirement on PSLR, with its power φ²/2 against ISLR. A cubic phase counts against
-its own requirement. Without such a requirement its power counts against ISLR, since it is part of the sidelobes.
+Independent powers add, even if `allocation.combine` sets another rule for phases. Each effect is judged only once. A
+tone counts against PSLR. If there is no requirement on PSLR, its power φ²/2 counts against ISLR. A cubic phase counts
+against its own requirement. If there is no such requirement, its power counts against ISLR, since it raises the
+sidelobes.
 
-Noise of phase variance σ² leaves exp(-σ²) of the energy in the response and spreads the rest over the image. A share
-E of the response lies within the first nulls, which are taken as the limits of the mainlobe in an image. Noise
-therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ² instead.
+Noise with the phase variance σ² leaves the fraction exp(-σ²) of the energy in the impulse response, and spreads the
+remaining energy over the image. The fraction E of the response's energy lies within the first nulls, which are taken
+as the limits of the mainlobe in an image. Noise therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ²
+instead.
 """
 
 import math
@@ -35,10 +37,10 @@ SMALLEST_REST_RAD = 1e-3  # rms, a power of -60 dB
 
 
 class Tone(NamedTuple):
-    """Tone of a platform's vibration, of an oscillator's spur, or of an oscillator's vibration.
+    """Sinusoidal phase error due to a platform's vibration, an oscillator's spur, or an oscillator's vibration.
 
-    `phase` is the peak phase [rad], and `cycles` the number of cycles per aperture. `in_quadrature` is the row of
-    another tone whose phase is a quarter cycle away from this tone's. If it is None, the tone may have any phase.
+    `phase` is the peak phase [rad], and `cycles` is the number of cycles per aperture. `in_quadrature` is the row id
+    of a second tone that is shifted by a quarter cycle against this tone. If it is None, the tone may have any phase.
     """
 
     subject: Subject
@@ -49,7 +51,10 @@ class Tone(NamedTuple):
 
 
 class SpreadPhase(NamedTuple):
-    """Variance of a spread phase [rad²], with the id of its row and the owner of the share it counts against."""
+    """Phase error that spreads energy over the image, with its variance [rad²] and the id of its row.
+
+    The error counts against the share that its owner has of the ISLR. The owner is a platform, the clock or the
+    mission."""
 
     row_id: str
     owner: str
@@ -57,44 +62,50 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """Error that was determined elsewhere and is stated by the ISLR that it adds. [dB]"""
+    """Error that was determined elsewhere and that the mission file states by the ISLR that it adds. [dB]"""
 
     subject: Subject
     islr: Any
 
     def rms(self, model: str, energy: float) -> Any:
-        """Rms phase that spreads the same power in a model, see `spread_phase`. [rad]"""
+        """Rms phase of noise that would add the stated ISLR. [rad]
+
+        For the parameters `model` and `energy` see `spread_phase`.
+        """
         return spread_phase(10 ** (np.asarray(self.islr) / 10), model, energy)
 
 
 def mainlobe_energy(mission: Mission) -> float:
-    """Share E of the response's energy that lies within its first nulls.
+    """Fraction E of the impulse response's energy that lies within the first nulls.
 
-    The response is that without errors, under the window of the images.
+    It is that of an error-free response with the window that the mission states for image formation.
     """
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
 
 
 def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
-    """Rms phase of noise that adds a given ISLR, the inverse of `islr_db`. [rad]
+    """Rms phase of noise that adds a given ISLR. [rad]
+
+    This is the inverse of `islr_db`.
 
     Parameters
     ----------
     ratio : float or array
         ISLR as a power ratio.
     model : str
-        `published` takes the ISLR by the paper's rule, σ². Any other name takes the ISLR of an image.
+        With `published` the ISLR is σ², by the paper's rule. Otherwise it is (exp(σ²) - 1)/E, as in an image. σ² is
+        the variance of the phase.
     energy : float
-        Share E, see `mainlobe_energy`.
+        Fraction E of the response's energy within the first nulls, see `mainlobe_energy`.
     """
     return np.sqrt(ratio if model == "published" else np.log1p(ratio * energy))
 
 
 def islr_db(variance: PerCase, model: str, energy: float) -> Any:
-    """ISLR that noise with a phase variance [rad²] above 0 adds. [dB]
+    """ISLR that noise with a given phase variance adds. [dB]
 
-    In the published model it is σ², by the paper's rule; otherwise it is the ISLR of an image. `spread_phase`
-    documents the parameters.
+    The variance σ² [rad²] must be above 0. In the published model the ISLR is σ², by the paper's rule. Otherwise it
+    is (exp(σ²) - 1)/E, as in an image. `energy` is the fraction E of `mainlobe_energy`.
     """
     if model == "published":
         return 10 * np.log10(variance)
@@ -103,15 +114,19 @@ def islr_db(variance: PerCase, model: str, energy: float) -> Any:
 
 
 def islr_of(mission: Mission, variance: PerCase) -> Floats:
-    """ISLR that noise with a phase variance [rad²] adds to an image; NaN without noise. [dB]"""
+    """ISLR that noise with a given phase variance [rad²] adds to an image of the mission. [dB]
+
+    It is NaN where the variance is 0 or NaN.
+    """
     with np.errstate(all="ignore"):
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
-    """Largest rms phase that an owner may spread under the requirement on ISLR; None without that requirement. [rad]
+    """Largest rms phase of noise with which an owner stays within its share of the required ISLR. [rad]
 
-    In the published model it follows from the paper's rule, otherwise from the ISLR of an image.
+    In the published model the limit follows from the paper's rule, otherwise from the ISLR in an image. The result is
+    None if the mission has no requirement on ISLR.
     """
     if mission.requirements.islr is None:
         return None
@@ -122,8 +137,8 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
 def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Tone]:
     """List the tones that make paired echoes.
 
-    These are vibrations with at least one cycle per aperture, tones of vibrating oscillators, and spurs. `geometry`
-    holds many cases if numbers of the mission are arrays.
+    They are vibrations of platforms with at least one cycle per aperture, tones of vibrating oscillators, and spurs.
+    `geometry` holds many cases if numbers of the mission are arrays.
     """
     T, echoes = mission.collection.aperture_time, []
     for name in PLATFORMS:
@@ -151,10 +166,12 @@ def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[To
 
 
 def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """Tones that represent the echoes of an oscillator's tone.
+    """List the tones that an oscillator's tone becomes after synchronization, as far as they make echoes.
 
-    A folded tone gives one tone per frequency. Without a PSLR requirement it gives one tone with all of the power, at
-    the frequency of the largest echo.
+    `alone` is the oscillator's tone, represented by a single tone. If synchronization does not fold it, the list has
+    only this tone. If synchronization folds it to several frequencies, the list has a tone for each of them. Without
+    a requirement on PSLR, a folded tone is listed as a single tone instead, with its total power at the frequency of
+    the largest echo. `free` is the peak phase without synchronization. [rad]
     """
     if not remaining.is_folded:
         return [alone]
@@ -170,10 +187,10 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the noise phases, which spread energy over the image, with their variances [rad²].
+    """List the phase errors by noise, which spread energy over the image, with their variances. [rad²]
 
-    They come from wideband vibration, sensor noise, phase noise, synchronization links, and powers that the file
-    states.
+    Their origins are wideband vibration, sensor noise, phase noise, synchronization links, and ISLR contributions
+    that the mission file states.
     """
     mission, spreads = analysis.mission, []
     for name in PLATFORMS:
@@ -192,11 +209,12 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List the phases beyond the cubic order of errors of motion, clocks, sensors and slow vibrations.
+    """List the parts beyond the cubic order of the phases that errors cause, with their variances. [rad²]
 
-    Their variances [rad²] are those at one sigma. Negligible ones are left out. They are very small for short
-    apertures, and larger for a quarter of a circle. The list is empty in the published model. Where a line of sight
-    turns by more than a radian, the phase of equal loss already contains them.
+    The errors are errors of motion, clocks and sensors, and slow vibrations. The variances are at one sigma, without
+    coverage factor. Negligible phases are left out. The phases are very small for short apertures, and larger for an
+    aperture of a quarter of a circle. The list is empty in the published model. Where a line of sight turns by more
+    than a radian, these parts are left out, because the quadratic phase of equal peak loss already contains them.
     """
     if model == "published":
         return []
@@ -224,7 +242,7 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List the errors determined elsewhere that the file states by the ISLR that they add."""
+    """List the errors that were determined elsewhere and that the mission file states by the ISLR that they add."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -233,12 +251,13 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
-    """List, for each owner, the phases that count against its share of the ISLR.
+    """List, for each owner, the phase errors that count against its share of the ISLR.
 
-    For the owner `mission`, these are the phases of all owners. The phases are noise, the phases of errors beyond the
-    cubic order, the tones if there is no requirement on PSLR, and the cubic phase if it has no requirement of its
-    own. The cubic phase combines the errors of the owner at one sigma. It is left out where it is negligible, or
-    where an error is too large for an image. A variance [rad²] is NaN in cases that do not have the phase.
+    For the owner `mission`, these are the phase errors of all owners. They are noise, and the parts of phases beyond
+    the cubic order. Tones are included if there is no requirement on PSLR. The cubic phase is included if it has no
+    requirement of its own. It combines the errors of the owner at one sigma. It is left out where it is negligible,
+    or where an error is so large that no image is left. A variance [rad²] is NaN in the cases in which the phase
+    error is left out or does not occur.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + analysis.rests(model)
@@ -260,6 +279,6 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
 
 
 def declared_powers(analysis: "Analysis", owner: str, model: str) -> list[SpreadPhase]:
-    """List the phases of an owner that count against ISLR, for a single case, in plain numbers."""
+    """List the phase errors that count against an owner's share of the ISLR, for a single case, in plain numbers."""
     (powers,) = powers_held_by_islr(analysis, [owner], model)
     return [power._replace(variance=float(np.ravel(power.variance)[0])) for power in powers]

@@ -1,6 +1,6 @@
-"""Combination of the declared errors of many cases.
+"""Combination of the phases and displacements that a mission's declared errors cause, for many cases at once.
 
-It covers their phases and displacements, and the owners whose shares they use.
+The errors may be combined for the whole mission, or for an owner of a share: transmitter, receiver or clock.
 """
 
 import math
@@ -30,22 +30,24 @@ from bisar_budget.mission.model import Shares
 
 
 class Together:
-    """Declared errors of many cases in one model, along the axes in which the file states them.
+    """Single and combined effects of the declared errors in one model, for many cases.
+
+    The errors are those along the axes in which the mission file states them.
 
     Parameters
     ----------
     errors : DeclaredErrors
         Errors of the cases.
     model : str
-        `published` or `full`.
+        Name of the model, `published` or `full`.
     slow : sequence of DeclaredPhase
-        Vibrations below one cycle per aperture.
+        Phases of vibrations below one cycle per aperture.
     tones : sequence of ToneDisplacement
         Displacements by vibrations and by tones of oscillators.
     random : sequence of RandomError
-        Errors of sensors, clocks and the air, declared or not.
+        Errors of sensors, clocks and the air. Errors without a declared size have no effect.
     groups : sequence of Correlated
-        Covariances of the mission.
+        Covariances that the mission declares, each for six errors of a platform.
     """
 
     def __init__(
@@ -64,17 +66,17 @@ class Together:
 
     @property
     def rule_of_all(self) -> str:
-        """Rule that combines all declared errors.
+        """Rule for sums that must include all declared errors.
 
-        It is the mission's rule, or root-sum-square if the mission's rule is `each`.
+        It is the mission's rule. If that is `each`, which forms no sums, it is `rss`, the root-sum-square.
         """
         return "rss" if self.rule == "each" else self.rule
 
     @cached_property
     def own(self) -> list[DeclaredPhase]:
-        """Phases of slow vibrations, and of declared errors of sensors, clocks and the air.
+        """Phases of slow vibrations, and of declared random errors of sensors, clocks and the air.
 
-        These errors have no signed displacement of their own.
+        The displacements by these errors have no sign, see `undirected_moves`.
         """
         array = self.errors.array
         phases = [
@@ -98,7 +100,10 @@ class Together:
 
     @cached_property
     def phases(self) -> list[DeclaredPhase]:
-        """Phases of all declared errors: errors of motion, clock errors, pure phase errors, and those in `own`."""
+        """Phases of all declared errors.
+
+        They are errors of motion, errors of clocks, pure phase errors, and the errors in `own`.
+        """
         phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
@@ -108,17 +113,20 @@ class Together:
         return [*phases_of_motion, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
-        """Phases that count against the share of an owner.
+        """List the phases of the declared errors that count against an owner's share.
 
-        If the owner is the mission, these are all phases.
+        `owner` is a platform, the clock or `mission`. For `mission`, all phases are returned. `split` decides whether
+        the errors of the clock count against the receiver's share.
         """
         return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
         """List the judged phases that a rule combines, as pairs of id and phase. [rad]
 
-        `rule` and `gain` are those of the mission unless given. Under root-sum-square the six phases of a covariance
-        are combined into one, according to their correlations.
+        The judged phase is the quadratic phase and `gain` times the hidden phase, as a root-sum-square. Autofocus
+        does not correct the hidden phase. `rule` and the autofocus gain `gain` are the values of the mission if they
+        are not given. Under root-sum-square the six phases of a covariance are combined to a single phase, according
+        to their correlations.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
         row_ids = [member.row_id for member in members]
@@ -136,12 +144,19 @@ class Together:
         return list(judged.items())
 
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Floats:
-        """Judged phases of errors, combined by the mission's rule or by the given rule. [rad]"""
+        """Combine the judged phases of the given errors, (cases,). [rad]
+
+        `rule` and `gain` are the values of the mission if they are not given. See `judged_parts` for the judged
+        phase.
+        """
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
     @cached_property
     def _hidden_of_groups(self) -> dict[str, Any]:
-        """Combined hidden phase of the six errors of each covariance, by its id; 0 in the published model. [rad]"""
+        """Combined hidden phase of the six errors of each covariance. [rad]
+
+        The keys are the ids of the covariances. Autofocus does not correct hidden phases. In the published model they
+        are 0."""
         if self.model == "published":
             return {group.id: 0.0 for group in self.groups}
         stated = {error.subject.id for error in self.motion}
@@ -150,7 +165,7 @@ class Together:
     def _hidden_of(self, group: Correlated) -> Floats:
         """Combined hidden phase of the six errors of a covariance, (cases,). [rad]
 
-        It is the root-sum-square of the hidden phases of the independent errors that compose the covariance.
+        It is the root-sum-square of the hidden phases of six independent errors with the same covariance.
         """
         errors = {error.subject.id: error for error in self.motion}
         remaining = []
@@ -161,41 +176,47 @@ class Together:
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
-        """Range errors at the nodes of six independent errors that compose a covariance, (6, nodes, cases). [m]
+        """Range errors of six independent errors that together have the covariance of six correlated errors. [m]
 
-        `remaining` are the range errors of the covariance's six correlated errors, (6, nodes, cases). [m] They are
-        transformed by a matrix root of the correlations.
+        The result is (6, nodes, cases). `remaining` are the range errors at the nodes due to the six correlated
+        errors, (6, nodes, cases). [m] They are multiplied by a factor F of the correlation matrix C, with FFᵀ = C.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
         return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
-        """Phases combined by the mission's rule or by the given rule. [rad]"""
+        """Combine phases by the given rule, or by the mission's rule if `rule` is empty, (cases,). [rad]
+
+        `phases` are pairs of row id and signed phase.
+        """
         return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
 
     def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
-        """Cubic phase of each error that counts against an owner's share, signed. [rad]
+        """List the cubic phases of the errors that count against an owner's share, without the coverage factor. [rad]
 
-        The coverage factor is removed.
+        The phases are signed. Each item is a pair of row id and phase. Errors without a cubic phase are left out.
         """
         members = self.owed(split, owner)
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
-        """Combined cubic phase of the errors that count against an owner's share. [rad]
+        """Combined cubic phase of the errors that count against an owner's share, without the coverage factor. [rad]
 
-        The coverage factor is removed. The phases are added under `combine: sum`, and otherwise combined as
-        root-sum-square, since powers add.
+        The phases are added under `combine: sum`. Under the other rules they are combined as a root-sum-square, since
+        powers add. The result is (cases,).
         """
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
-        """Displacement by each error of motion, prepared for the rule that combines displacements. [m]
+        """List the displacements of the image by errors of motion, in the form that a rule needs. [m]
 
-        Under the rule `sum`, which takes the largest sum over all signs, each error has half the difference between
-        the displacements for its two signs. The mean of these two displacements does not depend on the sign; its sum
-        over all errors is one further entry. Under the other rules, each error has the sign that moves the image
-        farther.
+        Each item is a pair of row id and (east, north). Under all rules except `sum`, the displacement is given for
+        the sign of the error that moves the image farther.
+
+        The rule `sum` takes the largest sum over all combinations of signs. The displacements for the two signs of an
+        error are split into a mean and a deviation from it. The deviation reverses with the sign, and it is the item
+        of the error. The means do not depend on the signs. Their sum over all errors is an additional item, unless it
+        is 0.
         """
         if rule != "sum":
             return [(error.subject.id, self.errors.farthest(self.model, error)) for error in self.motion]
@@ -210,10 +231,11 @@ class Together:
 
     @cached_property
     def undirected_moves(self) -> Moves:
-        """Displacement by errors without a sign, as pairs of id and (east, north). [m]
+        """Displacements of the image by random errors and tones, whose displacements have no sign. [m]
 
-        These are the sigmas of random errors, and the displacements by tones in their worst phases. The displacement
-        is 0 for a clock whose displacement the file does not determine.
+        Each item is a pair of row id and (east, north). For a random error these are the sigmas of the displacement.
+        For a tone, each component is given for the phase of the tone at which it is largest. The displacement is 0
+        for a clock whose displacement the mission file does not determine.
         """
         moves = []
         for error in self.random:
@@ -234,10 +256,10 @@ class Together:
         return bool(self.motion or self.undirected_moves)
 
     def moved(self, rule: str) -> Floats:
-        """Displacement of all errors combined by a rule; NaN where an error leaves no image. [m]
+        """Length of the displacement of the image by all declared errors, combined by a rule, (cases,). [m]
 
-        A random error or a tone has no direction. Under `sum` its length is added to the largest sum of the other
-        errors.
+        The displacement by a random error or a tone has no sign. Under `sum` its length is added to the largest sum
+        of the displacements by errors of motion. The result is NaN where an error leaves no image.
         """
         if rule != "sum":
             moves = [*self.moves(rule), *self.undirected_moves]
@@ -247,17 +269,19 @@ class Together:
 
     # ---------------------------------------------------------------- one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
-        """List the signed phases that the mission's rule, or the given rule, combines, for one case. [rad]
+        """List the signed phases that a rule combines in one case, in plain numbers. [rad]
 
-        Each item is a pair of id and phase.
+        Each item is a pair of id and phase. If `rule` is empty, it is the mission's rule. Under root-sum-square the
+        six phases of a covariance are combined to a single item.
         """
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)
         return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
-        """List the displacements that the mission's rule combines, for one case. [m]
+        """List the displacements of the image that the mission's rule combines in one case, in plain numbers. [m]
 
-        Each item is a pair of id and (east, north). The list is empty if an error leaves no image.
+        Each item is a pair of id and (east, north). The list is empty if an error leaves no image. Under
+        root-sum-square the six displacements of a covariance are combined to a single item.
         """
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
         combined_parts = [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in named_moves]
@@ -265,10 +289,13 @@ class Together:
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
-    """List pairs of row id and signed quadratic phase of the given errors. [rad]"""
+    """List the signed quadratic phases of the given errors, as pairs of row id and phase. [rad]"""
     return [(phase.row_id, phase.qpe_rad) for phase in members]
 
 
 def cubics(members: Iterable[DeclaredPhase]) -> Phases:
-    """List pairs of row id and signed cubic phase of those given errors that have a cubic phase. [rad]"""
+    """List the signed cubic phases of the given errors, as pairs of row id and phase. [rad]
+
+    Errors without a cubic phase are left out.
+    """
     return [(phase.row_id, phase.cubic_rad) for phase in members if phase.cubic_rad is not None]

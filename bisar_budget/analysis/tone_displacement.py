@@ -1,15 +1,18 @@
 """Displacement of the image by tones: vibrations of platforms, and tones of their oscillators.
 
-Over an aperture, a tone of amplitude A has the mean A·j₀(x) and, at the edge, the linear part 3A·j₁(x), with x = πfT.
-They displace the image like the parts of any range error: according to (25), or, along a turning line of sight, by
-orders 0 to 3 with exact ranges. Orders 0 and 2 have their maximum at the same phase of the tone, and orders 1 and 3 a
-quarter cycle later. The image therefore moves on an ellipse as the phase of the tone varies.
+Over an aperture of duration T, a tone of frequency f and amplitude A has the mean A·j₀(x), with x = πfT. Its linear
+part is 3A·j₁(x) at the aperture edge. These parts of the range error displace the image. In the published model the
+displacement follows from (25). In the full model, whose line of sight turns, it follows from the Legendre orders 0 to
+3 of the tone with exact ranges. Orders 0 and 2 are largest at the same phase of the tone, and orders 1 and 3 are
+largest a quarter cycle later. The image therefore moves on an ellipse as the phase of the tone varies.
 
-East and north each count in their worst phase. Their root-sum-square is √2 times the rms displacement over all
-phases. It lies between the largest displacement and √2 times the largest. Derived here, to first order in the
-amplitude. Exact ranges in all phases check it (`tests/analysis/test_tone_displacement.py`).
+The east and the north component are each taken at the phase at which they are largest. Their root-sum-square is √2
+times the rms displacement over all phases. It lies between the largest displacement and √2 times the largest
+displacement. Derived here, to first order in the amplitude. `tests/analysis/test_tone_displacement.py` checks it
+against exact ranges for all phases.
 
-The axes of a vibration may be in any phase, so their displacements add. A faster tone displaces less, as 1/(fT).
+The axes of a vibration may vibrate in any phase, so their displacements add. The displacement decreases with the
+frequency of the tone, as 1/(fT).
 """
 
 import math
@@ -34,10 +37,11 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):
-    """Part of a tone along one direction.
+    """Part of a tone that has a single direction and a single frequency, with the displacement that it causes.
 
-    `orders` (4, n) are the signed amplitudes of its orders 0 to 3 at the aperture edge. [m] `per_metre` (4, 2, n) is
-    the displacement per metre of each order, east and north. [m/m]
+    `orders` (4, n) are the signed amplitudes of its Legendre orders 0 to 3 at the aperture edge. [m] `per_metre`
+    (4, 2, n) is the displacement of the image, east and north, per metre of each order. [m/m] The last axis holds n
+    cases.
     """
 
     orders: Floats
@@ -45,15 +49,16 @@ class TonePart(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """Displacement east and north, each in its worst phase, (2, n). [m]"""
+        """Displacement of the image east and north, each at the phase at which it is largest, (2, n). [m]"""
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
         return np.asarray(np.hypot(constant - quadratic, linear - cubic))
 
 
 class ToneDisplacement(NamedTuple):
-    """Displacement of the image by a tone, as parts for each model, with the subject of the tone's row.
+    """Displacement of the image by a tone in both models.
 
-    The parts may be in any phase relative to each other.
+    `subject` is the subject of the tone's row. `published` and `full` are the parts of the tone in each model, such
+    as a part for each axis of a vibration. The parts may be in any phase relative to each other.
     """
 
     subject: Subject
@@ -61,19 +66,25 @@ class ToneDisplacement(NamedTuple):
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """Parts of the tone according to the model of the given name."""
+        """Return the parts of the tone in the model of the given name, `published` or `full`."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
-        """Displacement east and north according to a model, each component in its worst phase, (2, n). [m]"""
+        """Displacement of the image east and north in the model of the given name, (2, n). [m]
+
+        Each component is given for the phase of the tone at which it is largest. The displacements by all parts of
+        the tone are added.
+        """
         return np.asarray(sum(tone_part.displacement for tone_part in self.parts(model)))
 
 
 def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
-    """Displacement by every vibration of a platform and every tone of an oscillator, with or without echoes.
+    """List the displacements of the image by vibrations of platforms and by tones of oscillators.
 
-    A tone that exchanges fold has a part at each frequency. Below one cycle per aperture, the vibration of an
-    oscillator counts in the row of the oscillator's acceleration, and a folded tone in the row of the oscillator.
+    Vibrations of platforms are included at any frequency. If the exchanges of a synchronization link fold an
+    oscillator's tone, the tone has a part at each resulting frequency. Two effects below one cycle per aperture are
+    not included, because they are in separate rows. The effect of an oscillator's vibration is in the row of the
+    oscillator's acceleration. The effect of a folded tone is in the row of the oscillator.
     """
     T, plane, displacements = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
     for platform_index, name in enumerate(PLATFORMS):
@@ -111,10 +122,11 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
 def _tones_of_oscillators(
     mission: Mission, geometry: BistaticGeometry
 ) -> Iterator[tuple[Subject, PerCase, LeftTone]]:
-    """Yield the tones of the oscillators: their spurs, and the tones that vibration causes.
+    """Yield the tones of the oscillators, which are their spurs and the tones that vibration causes.
 
-    Each item has the subject of the tone's row, the peak phase of the tone without synchronization [rad], and the
-    part of the tone that the synchronization leaves. The phase is 0 for a slow vibration whose tone is not folded.
+    Each item has three elements. They are the subject of the tone's row, the peak phase of the tone without
+    synchronization [rad], and the tones that remain after synchronization. The phase is 0 for a vibration below one
+    cycle per aperture whose tone is not folded.
     """
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
@@ -127,16 +139,19 @@ def _tones_of_oscillators(
 
 
 def _orders(cycles: PerCase, size: PerCase) -> Floats:
-    """Amplitudes of orders 0 to 3 of a tone at the aperture edge, (4, n). [m]
+    """Signed amplitudes of the Legendre orders 0 to 3 of a tone at the aperture edge, (4, n). [m]
 
-    `cycles` is the number of cycles per aperture, and `size` the amplitude of the tone. [m]
+    `cycles` is the number of cycles per aperture, and `size` is the amplitude of the tone. [m]
     """
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
 
 
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
-    """Displacement per metre of each order according to (25), (4, 2, n); NaN where Q has no inverse. [m/m]"""
+    """Displacement of the image, east and north, per metre of each Legendre order, according to (25). [m/m]
+
+    The result is (4, 2, n). It is 0 for orders 2 and 3. It is NaN for orders 0 and 1 where Q has no inverse.
+    """
     plane, _ = published_planes(geometry)
     displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))
     scale = 1 / np.where(plane.is_singular, math.nan, plane.determinant)
@@ -146,9 +161,9 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
-    """Displacement per metre of each order by exact ranges, (4, 2, n). [m/m]
+    """Displacement of the image, east and north, per metre of each Legendre order, by exact ranges. [m/m]
 
-    `along` (nodes, n) is the range error at the nodes per metre of the tone.
+    The result is (4, 2, n). `along` (nodes, n) is the range error at the nodes per metre of the tone's motion. [m/m]
     """
     seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

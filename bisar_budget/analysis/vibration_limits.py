@@ -1,18 +1,22 @@
-"""Limits of vibration: effects of a platform's motion along the line of sight, compared with the requirements.
+"""Limits of vibration: the largest motion of a platform along the line of sight that meets the requirements.
 
-The limits follow from the paper's rule and from first principles. A motion of amplitude A along the line of sight is
-a phase of peak φ = 2πA/λ. A sinusoid makes paired echoes with J₁(φ)/J₀(φ) of the amplitude of the response, about
-φ/2. Gaussian noise of rms σ leaves exp(-σ²) of the power in the response and spreads the rest, so that an image shows
-an ISLR of (exp(σ²) - 1)/E, see `spread`. Derived here, checked against the transform of the phase.
+The limits follow from the paper's rule, and separately from first principles. A motion of amplitude A along the line
+of sight causes a phase with the peak φ = 2πA/λ. A sinusoidal motion makes paired echoes. Their amplitude relative to
+the impulse response is J₁(φ)/J₀(φ), about φ/2. Gaussian noise with the rms phase σ leaves the fraction exp(-σ²) of
+the power in the response and spreads the remaining power. An image then shows an ISLR of (exp(σ²) - 1)/E, see
+`spread`. Derived here, and checked against the transform of the phase.
 
-If both platforms stay within their shares, they must meet the requirement together. If both vibrate at one frequency,
-their echoes add in amplitude in the worst phase. The allowable amplitude is therefore divided, in the ratio of the
-roots of the shares of power. Noise is independent from platform to platform, so variances add and the allowable power
-is divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, is 3 dB below the first limit at equal shares. It
-exceeds the second limit by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
+The requirement is divided between the platforms. If each platform stays within its share, both together must meet the
+requirement. If both vibrate at the same frequency, the amplitudes of their echoes add in the worst phase. The
+allowable amplitude is therefore divided, in the ratio of the roots of the shares of power. Noise is independent from
+platform to platform, so variances add and the allowable power is divided.
 
-Between one and three cycles per aperture a vibration also causes a quadratic phase, and counts as echoes. A slower
-vibration makes no echoes, see `effects.vibration`.
+The paper's rule is φ² ≤ PSLR·share and σ² ≤ ISLR·share. At equal shares, its limit for sinusoids is 3 dB below the
+limit from first principles. Its limit for noise exceeds the limit from first principles by 1/E, which is 0.44 dB with
+a uniform window. If both platforms had the same noise instead of independent noise, this would add 3 dB.
+
+A vibration between one and three cycles per aperture counts as a vibration that makes echoes, although it also causes
+a quadratic phase. A slower vibration makes no echoes, see `effects.vibration`.
 """
 
 import math
@@ -39,28 +43,32 @@ _motion_of_phase: Callable[..., PerCase] = evaluators.motion_of_phase
 
 
 class VibrationLimits(NamedTuple):
-    """Largest allowed vibration of one platform along the line of sight, 0 to peak or rms. [m]
+    """Largest allowed vibration of a platform along the line of sight, as an amplitude or an rms value. [m]
 
-    `published` follows the paper's rule, `full` follows from first principles.
+    The limit `published` follows the paper's rule, and `full` follows from first principles. Amplitudes
+    are measured from 0 to peak.
     """
 
     published: Any
     full: Any
 
     def by(self, model: str) -> Any:
-        """Limit according to the gating model. Under `strictest` it is the smaller of both limits. [m]"""
+        """Return the limit according to a gating model, `published`, `full` or `strictest`. [m]
+
+        Under `strictest` it is the smaller of both limits.
+        """
         return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
     @property
     def margin_db(self) -> Any:
-        """Ratio of the limit from first principles to that of the paper's rule. [dB]"""
+        """Ratio of the limit from first principles to the limit by the paper's rule. [dB]"""
         return 20 * np.log10(self.full / self.published)
 
 
 def echo_level(phase: PerCase) -> PerCase:
-    """Amplitude of a paired echo relative to the response, J₁(φ)/J₀(φ).
+    """Amplitude of a paired echo relative to the impulse response, J₁(φ)/J₀(φ).
 
-    The peak phase φ of the sinusoid may be up to 2 rad.
+    `phase` is the peak phase φ of the sinusoid, up to 2 rad.
     """
     j0, j1 = bessel(phase)
     return j1 / j0
@@ -80,11 +88,11 @@ def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
 
 
 class Echo(NamedTuple):
-    """Paired echo of one tone, or of neighbouring tones in their worst phases.
+    """Paired echo of a single tone, or of tones with neighbouring frequencies in their worst phases.
 
-    `phase` is the peak phase of a single tone with an equally high echo. [rad] `cycles` is the position of the echo,
-    in cells from the response. `level` is its amplitude relative to the response. `is_of` (tones, ...) marks the
-    tones that make the echo.
+    `phase` is the peak phase of a single tone with an equally high echo. [rad] `cycles` is the number of cycles per
+    aperture, which is also the distance of the echo from the main response in resolution cells. `level` is the
+    amplitude of the echo relative to the main response. `is_of` (tones, ...) marks the tones that make the echo.
     """
 
     phase: Any
@@ -94,12 +102,18 @@ class Echo(NamedTuple):
 
 
 def level_of(phase: PerCase) -> PerCase:
-    """Amplitude of a paired echo relative to the response. For peak phases above 2 rad it is half the phase."""
+    """Amplitude of a paired echo relative to the impulse response, for any peak phase.
+
+    Up to a peak phase of 2 rad it is `echo_level`. Above 2 rad it is taken as half the phase.
+    """
     return np.where(phase <= MAX_ECHO_PHASE_RAD, echo_level(np.minimum(phase, MAX_ECHO_PHASE_RAD)), phase / 2)[()]
 
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
-    """Pairs of tones in quadrature: index of a tone, and index of the tone that is a quarter cycle away from it."""
+    """List the pairs of tones that are in quadrature, which means a quarter cycle apart.
+
+    Each item is a pair of indices in `tones`.
+    """
     index_by_id = {tone.subject.id: index for index, tone in enumerate(tones)}
     return [
         (here, index_by_id[tone.in_quadrature])
@@ -109,10 +123,10 @@ def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
-    """Highest echo of single tones and of groups of neighbouring tones; None without tones.
+    """Find the highest paired echo that a single tone, or a group of tones with neighbouring frequencies, makes.
 
-    `shape` is the shape of the tones' numbers: (cases,), or () for plain numbers. In a case without a tone, the level
-    of the echo is 0.
+    `shape` is the shape of the numbers in `tones`. It is (cases,), or () for plain numbers. The result is None if
+    `tones` is empty. In a case without a tone, the level of the echo is 0.
     """
     if not tones:
         return None
@@ -149,9 +163,9 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
 
 
 def echo_phase(level: PerCase) -> PerCase:
-    """Peak phase of a sinusoid whose echoes have a given amplitude relative to the response. [rad]
+    """Peak phase of a sinusoid whose paired echoes have a given amplitude relative to the impulse response. [rad]
 
-    The amplitude may be up to 1.
+    `level` is this amplitude, up to 1. The function is the inverse of `echo_level`.
     """
     # J₁/J₀ is above φ/2, convex, and 1 at 1.43: from here Newton's steps go down to it.
     phase = np.minimum(2 * level, 1.5)
@@ -162,9 +176,10 @@ def echo_phase(level: PerCase) -> PerCase:
 
 
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
-    """Limits of each platform's vibration along the line of sight that follow from the requirement `metric`. [m]
+    """Limits of the platforms' vibrations along the line of sight, set by the requirement on PSLR or ISLR. [m]
 
-    `metric` is `pslr`, for amplitudes, or `islr`, for rms values. Empty without that requirement.
+    `metric` is `pslr`, which limits amplitudes, or `islr`, which limits rms values. The result maps the names of the
+    platforms to their limits. It is empty if the mission has no such requirement.
     """
     requirement_db, split = getattr(mission.requirements, metric), getattr(allocation, metric)
     if requirement_db is None:
@@ -184,10 +199,11 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
 
 
 def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
-    """Name of the requirement that limits tones, and the largest amplitude of a tone of each platform. [m]
+    """Name of the requirement that limits tones, and the largest amplitude of a tone for each platform. [m]
 
-    Tones are limited by the requirement on PSLR. If there is none, the requirement on ISLR limits them, with the
-    phase variance φ²/2 of a tone of peak phase φ. Without either requirement there are no limits.
+    The requirement on PSLR limits tones. If the mission has no such requirement, the requirement on ISLR limits them.
+    A tone with the peak phase φ then counts with its phase variance φ²/2. If the mission has neither requirement, the
+    name is `pslr` and the mapping of limits is empty.
     """
     needs = mission.requirements
     if needs.pslr is not None or needs.islr is None:
@@ -200,9 +216,9 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
 
 
 def amplitude_share(split: Shares, name: str) -> PerCase:
-    """Share of a platform in the sum of amplitudes.
+    """Share of a platform in the allowed amplitude of paired echoes.
 
-    The shares of both platforms sum to 1. Their ratio is that of the roots of the shares of power.
+    The shares of both platforms sum to 1. They are in the ratio of the roots of the shares of power in `split`.
     """
     share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
     return evaluators.amplitude_share(share, share_of_other)
@@ -211,9 +227,11 @@ def amplitude_share(split: Shares, name: str) -> PerCase:
 class SlowLimits(NamedTuple):
     """Amplitudes along the line of sight at which a slow vibration reaches its limits of phase. [m]
 
-    `quadratic` is the amplitude at the platform's limit of the quadratic phase, and `cubic` that at the requirement
-    on the cubic phase. `use` is the utilization of the stricter limit by the declared vibration, and `quadratic_use`
-    that of the limit of the quadratic phase.
+    At the amplitude `quadratic` the vibration reaches the platform's limit of the quadratic phase. At the amplitude
+    `cubic` it reaches the required cubic phase. `cubic` is None without a requirement on the cubic phase.
+
+    `quadratic_use` is the utilization of the limit of the quadratic phase by the declared vibration. `use` is the
+    larger of the utilizations of both limits.
     """
 
     quadratic: Floats
@@ -223,20 +241,24 @@ class SlowLimits(NamedTuple):
 
     @property
     def smallest(self) -> Floats:
-        """Smaller of both amplitudes. [m]"""
+        """Smaller of the amplitudes `quadratic` and `cubic`, (cases,). [m]
+
+        Without a requirement on the cubic phase it is `quadratic`.
+        """
         return self.quadratic if self.cubic is None else np.minimum(self.quadratic, self.cubic)
 
     @property
     def is_cubic(self) -> Booleans:
-        """Whether the cubic phase sets the limit."""
+        """Whether the cubic phase limits the vibration more strictly than the quadratic phase, (cases,)."""
         return self.use > self.quadratic_use
 
 
 def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> SlowLimits:
-    """Largest amplitudes of a vibration below one cycle per aperture, in its worst phase; see `effects.slow_tones`.
+    """Largest allowed amplitudes of a vibration below one cycle per aperture. [m]
 
-    The limit of the quadratic phase is the platform's share, autofocus gain included. The limit of the cubic phase,
-    if one is required, is the whole requirement without gain.
+    The vibration is taken in its worst phase, see `effects.slow_tones`. The limit of the quadratic phase is the
+    platform's share of the budget, autofocus gain included. The limit of the cubic phase is the whole requirement
+    without autofocus gain, if the mission has such a requirement.
     """
     gain, allowed = allocation.autofocus_gain, allocation.qpe_allowed(tone.subject.owner)
     required = mission.requirements.cubic_phase_error

@@ -1,8 +1,8 @@
-"""Random delays in the air: after correction, each leg is longer than the processor assumes.
+"""Random delays in the air: after correction, the path from each platform to the scene is longer than assumed.
 
-The delay of a leg is the zenith delay times a factor. The factor depends on the elevation of the platform above the
-scene. The elevation changes over the aperture, and so does the delay. Orders 0 and 1 of the delay displace the image;
-orders 2 and higher defocus it.
+A leg is the path between a platform and the scene. Its delay is the zenith delay times a factor. The factor depends
+on the elevation of the platform above the scene. The elevation changes over the aperture, and so does the delay.
+Orders 0 and 1 of the delay displace the image; orders 2 and higher defocus it.
 
 The troposphere delays all frequencies by the same amount. Free electrons cause the group delay g = 40.3·TEC/f² [m],
 where TEC is the electron content along the leg [1/m²], and advance the phase at the centre frequency by the same
@@ -10,8 +10,9 @@ amount. In the image, the constant part of the range error is that of the group 
 over the aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where g₁ is the linear
 part of g. The phases are those of −g together with the phases that the displacement adds. Derived here.
 
-With a correlation time the zenith delay changes within the aperture (`range_processes`). The published model computes
-the effects of such a process for the line of sight at mid-aperture. The full model follows the turn of the leg.
+A delay with a correlation time changes within the aperture as a random process (`range_processes`). The published
+model computes the effects of the process for the line of sight at mid-aperture. In the full model the line of sight
+turns over the aperture.
 """
 
 import math
@@ -44,9 +45,9 @@ DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: PerCase) -> PerCase:
-    """Ratio of the path length of a leg in a thin shell of the air to the path length at the zenith.
+    """Ratio of the path length that a leg has in a thin shell of the air to the path length at the zenith.
 
-    It is exact for a spherical Earth.
+    A leg is the path between a platform and the scene. The ratio is exact for a spherical Earth.
 
     Parameters
     ----------
@@ -63,10 +64,11 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
     """Ratio of the delay on a platform's leg to the delay at the zenith, for positions (…) of the platform.
 
-    `middle` is the platform's position at mid-aperture. For a platform below `AIR_TOP_M`, the neutral air is treated
-    as on a flat Earth, and the ratio for free electrons is 0, because all of them are above the leg. The ratio for
-    the neutral air is also 0 at an elevation below `LEAST_ELEVATION_DEG`, because a mission file must not state a
-    delay there.
+    `delay` is an entry of `DELAYS`. `middle` is the platform's position at mid-aperture.
+
+    For a platform below `AIR_TOP_M`, the neutral air is treated as on a flat Earth. The ratio for free electrons is
+    then 0, because all of them are above the leg. At an elevation below `LEAST_ELEVATION_DEG`, the ratio for the
+    neutral air is also 0, because a mission file must not state a delay there.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= AIR_TOP_M
@@ -78,21 +80,21 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
 
 
 def metres_per_unit(mission: Mission, delay: str) -> PerCase:
-    """Group delay at the zenith per unit of a declared delay, at the centre frequency. [m/unit]"""
+    """Group delay at the centre frequency per declared unit of a zenith delay or zenith electron content. [m/unit]"""
     return 1.0 if delay == DELAY else ELECTRON_DELAY_M3_PER_S2 / np.square(mission.radar.center_frequency)
 
 
 def group_delay(mission: Mission, path: PlatformState, delay: str, times: PerCase) -> PerCase:
-    """Group delay of a platform's leg at the slow times `times` [s], per unit of a declared delay. [m/unit]"""
+    """Group delay of a platform's leg at the slow times `times` [s], per declared unit of a zenith delay. [m/unit]"""
     return metres_per_unit(mission, delay) * leg_factor(delay, path.place(times), path.position)
 
 
 def seen_course(group: Floats, mean: Floats, delay: str) -> Floats:
-    """Range error in the image that a group delay causes. [m]
+    """Range error over the aperture that a group delay causes in the image. [m]
 
-    `group` is the group delay over the aperture, and `mean` is its constant part. [m] A tropospheric delay is itself
-    the range error. For free electrons, only the constant part has the sign of the group delay; everything else has
-    the opposite sign, as the phase is advanced.
+    `group` is the group delay over the aperture, and `mean` is its mean. [m] The range error of a tropospheric delay
+    is the group delay itself. Free electrons advance the phase. Their range error has the sign of the group delay
+    only in its constant part, and the opposite sign in all other parts.
     """
     return group if delay == DELAY else 2 * mean - group
 
@@ -103,7 +105,7 @@ def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) 
     Parameters
     ----------
     delay : str
-        One of `DELAYS`.
+        An entry of `DELAYS`.
     track : Vectors
         Positions of the platform at the nodes, (nodes, cases), relative to a point of the scene. [m]
     middle : Vectors
@@ -128,8 +130,8 @@ def dispersion_per_unit(mission: Mission, path: PlatformState) -> PerCase:
 def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, PerCase]:
     """Quadratic phase at the edges of the band due to the declared electron content of each leg. [rad]
 
-    The result maps the name of a platform to the phase of its leg. The phases include the coverage factor. Legs
-    without a declared content are left out.
+    The result maps the name of a platform to the phase of its leg. The phases include the coverage factor. A leg
+    without a declared content is left out.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
     phases: dict[str, PerCase] = {}
@@ -152,16 +154,16 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms whose legs a delay of the given owner affects. A delay of the mission affects both legs."""
+    """Platforms whose legs have a delay that belongs to the given owner: a platform, or `mission` for both legs."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
-    """Yield the delays of the air, declared or not; nothing if the file states nothing about the air.
+    """Yield the errors due to delays of the air, declared or not; no errors if the file does not describe the air.
 
-    A delay that the file states once for the whole mission is one random number. It delays both legs, each by the
-    factor of its own elevation, and the effects on both legs add with their signs before they are squared. Each leg
-    then also has a row of its own. That row only informs: its effect is already part of the row of the mission.
+    A delay that the file states for both legs together is one random number. It delays both legs, each by the factor
+    for its own elevation. The effects on both legs add with their signs before they are squared. Each leg then also
+    has a row of its own. This row is only informative, because its effect is already part of the row of the mission.
     """
     propagation = seen.mission.propagation
     if propagation is None:
@@ -180,10 +182,10 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay of a leg at the nodes per unit of a zenith delay, for the turning and for the fixed leg. [m/unit]
+    """Group delay of a leg at the nodes per unit of a zenith delay: with and without the turn of the leg. [m/unit]
 
-    Both results are (nodes, cases). The first follows the leg over the aperture. The second has the value at
-    mid-aperture at all nodes.
+    Returns two arrays (nodes, cases). The first follows the elevation of the leg over the aperture. The second has
+    the value at mid-aperture at all nodes.
     """
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
@@ -194,10 +196,10 @@ def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Fl
 def _delay_error(
     seen: SensorCases, owner: str, delay: str, groups: Sequence[tuple[Floats, Floats]], counted_in: str = ""
 ) -> RandomError:
-    """Create the error of a delay of one leg, or of a delay that both legs share.
+    """Create the error due to a delay of one leg, or to a delay that both legs share.
 
-    `groups` has the results of `_groups_of_leg` for these legs. `counted_in` is the id of the row that already
-    includes the effect; empty if there is none.
+    `groups` contains the result of `_groups_of_leg` for each of these legs. `counted_in` is the id of the row that
+    already includes the effect; it is empty if no row does.
     """
     propagation = seen.mission.propagation
     name = legs_of(owner)[0]
@@ -225,7 +227,7 @@ def _delay_error(
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
     """Correlation time of the delay of one leg, or of a delay that both legs share. [s]
 
-    None if the delay is constant.
+    None if the delay is constant, or if the file states no delay.
     """
     leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
     return None if leg is None else leg.correlation_time
@@ -234,10 +236,10 @@ def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
 def _changing(
     seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: PerCase
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects, in both models, of one unit of a delay that changes within the aperture.
+    """Effects of one unit of a delay that changes within the aperture: in the published and in the full model.
 
-    `group` is the group delay of the leg as it turns, for the full model. `at_mid_aperture` is the group delay at
-    mid-aperture, for the published model. [m/unit]
+    `group` (nodes, cases) is the group delay along the turning leg, for the full model. `at_mid_aperture` (cases,) is
+    the group delay at mid-aperture, for the published model. [m/unit]
     """
     k, half = seen.exact.k, seen.exact.half
     along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
@@ -251,9 +253,10 @@ def _changing(
 def changing_air(
     mission: Mission, geometry: BistaticGeometry, cases: int, correlation_time: float
 ) -> list[RandomError]:
-    """List the declared delays that are constant within the aperture, as if they had a given correlation time [s].
+    """List the errors due to declared constant delays, computed as if the delays had the given correlation time [s].
 
-    A delay that both legs share is one error in the list. `geometry` is the geometry of the cases.
+    Only delays without a correlation time of their own are listed. A delay that both legs share is one error in the
+    list. `geometry` is the geometry of the cases.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
@@ -269,10 +272,10 @@ def changing_air(
 
 
 def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: int) -> Floats:
-    """Independent components of the zenith delay at `count` nodes, (courses, nodes, cases).
+    """Independent components of a unit zenith delay over the aperture at `count` nodes, (courses, nodes, cases).
 
-    The sum of the components, each times an independent random number of variance 1, is a delay of variance 1. A
-    delay without a correlation time has one component, which is constant.
+    If each component is multiplied by an independent random number of variance 1, the sum is a delay of variance 1. A
+    delay without a correlation time has a single component, which is constant.
     """
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:

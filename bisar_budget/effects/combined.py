@@ -1,10 +1,11 @@
-"""Combination of several errors by worst case or root-sum-square, for phases and displacements on the ground.
+"""Combination of the phases, or of the displacements on the ground, that several errors cause.
 
-Under root-sum-square the errors of one covariance C count as one error with the effect √(gᵀCg), where gᵢ is the
-effect of one unit of error i. In terms of the effects φᵢ = gᵢσᵢ and the correlations ρᵢⱼ, gᵀCg = Σ ρᵢⱼφᵢφⱼ. The
-result does not depend on the frame, because the effects are computed along the axes of the covariance's own frame.
+The rules are the largest magnitude, the sum, and the root-sum-square. Under root-sum-square the errors of a
+covariance C count as a single error with the effect √(gᵀCg), where gᵢ is the effect of one unit of error i. In terms
+of the effects φᵢ = gᵢσᵢ and the correlations ρᵢⱼ, gᵀCg = Σ ρᵢⱼφᵢφⱼ. The result does not depend on the frame of the
+covariance, because the effects are computed along the axes of the same frame.
 
-Phases and displacements are arrays over cases, (cases,). For one case they may be numbers.
+Phases and displacements are arrays over cases, (cases,). For a single case they may be numbers.
 """
 
 import math
@@ -29,7 +30,10 @@ Size = TypeVar("Size")  # effect of an error: a phase or a displacement
 
 
 class Correlated(NamedTuple):
-    """The six errors of a platform's covariance: the ids of their rows, and their correlations (6, 6)."""
+    """The six errors of a platform's covariance: the ids of their rows, and their correlations (6, 6).
+
+    The errors are three of position and three of velocity, in this order.
+    """
 
     platform: str
     ids: tuple[str, ...]
@@ -37,11 +41,11 @@ class Correlated(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Id of the six errors as one entry."""
+        """Id of the combined error that replaces the six errors in a list of phases or displacements."""
         return f"{self.platform}.covariance"
 
     def of(self, cases: Indices) -> "Correlated":
-        """Return the covariance of the cases with the given indices."""
+        """Return the same covariance with the correlations of the cases at the given indices."""
         rows = [
             [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
             for row in self.correlation
@@ -49,9 +53,9 @@ class Correlated(NamedTuple):
         return self._replace(correlation=rows)
 
     def phase(self, phases: Sequence[PerCase] | Floats) -> PerCase:
-        """Combined phase √(gᵀCg) of the six errors, from their phases gᵢσᵢ. [rad]
+        """Combined phase √(gᵀCg) of the six errors. [rad]
 
-        Infinite if any of the phases is infinite.
+        `phases` are the phases gᵢσᵢ of the six errors. The result is infinite if any of them is infinite.
         """
         with np.errstate(invalid="ignore"):
             size = np.sqrt(squared(self.correlation, phases))
@@ -60,15 +64,15 @@ class Correlated(NamedTuple):
     def displacement(self, moves: Sequence[tuple[PerCase, PerCase]]) -> tuple[PerCase, PerCase]:
         """Rms length of the combined displacement, as the pair (length, 0). [m]
 
-        The length is the root of the trace of the displacement's covariance. The combined displacement has no
-        direction.
+        `moves` are the displacements of the six errors, east and north. [m] The length is the root of the trace of
+        the covariance of the combined displacement. The combined displacement has no direction.
         """
         length = np.sqrt(sum(squared(self.correlation, along) for along in zip(*moves, strict=True)))
         return length, 0.0 * length
 
 
 def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
-    """List the covariances that a mission file states for its platforms; empty for most missions."""
+    """List the covariances that a mission file states for its platforms; empty if it states no covariance."""
     groups = []
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
@@ -83,7 +87,7 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 
 def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] | Floats) -> PerCase:
-    """Variance of the sum of correlated parts with the sigmas vᵢ: Σ ρᵢⱼvᵢvⱼ, in the squared unit of the parts.
+    """Variance Σ ρᵢⱼvᵢvⱼ of the sum of correlated parts with the sigmas vᵢ, in the squared unit of the parts.
 
     A negative result, due to rounding, is set to zero.
     """
@@ -100,7 +104,8 @@ def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] |
 def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, PerCase]]:
     """List the phases that a rule combines, as pairs of id and phase. [rad]
 
-    Under `rss` the six errors of a covariance are one entry; under all other rules they are six entries.
+    `phases` are the same pairs for the single errors. Under `rss` the six errors of a covariance become a single
+    entry. Under all other rules they remain six entries.
     """
     return _parts(phases, rule, groups, Correlated.phase)
 
@@ -110,7 +115,7 @@ def displacement_parts(
 ) -> list[tuple[str, tuple[PerCase, PerCase]]]:
     """List the displacements that a rule combines, as pairs of id and (east, north). [m]
 
-    A covariance is treated as in `phase_parts`.
+    The errors of a covariance are treated as in `phase_parts`.
     """
     return _parts(moves, rule, groups, Correlated.displacement)
 
@@ -142,7 +147,7 @@ def combined_phase(phases: Phases, rule: str, groups: Sequence[Correlated] = ())
 def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] = ()) -> PerCase:
     """Length of the combined displacement of several errors under a rule. [m]
 
-    Under `sum` it is the longest vector sum for any signs of the displacements. Under `rss` the errors of a
+    Under `sum` it is the largest length of the vector sum over all combinations of signs. Under `rss` the errors of a
     covariance contribute the rms length of their combined displacement.
     """
     vectors = np.array([move for _, move in displacement_parts(moves, rule, groups)])
@@ -152,9 +157,10 @@ def combined_displacement(moves: Moves, rule: str, groups: Sequence[Correlated] 
 
 
 def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
-    """Combined magnitude (...) of phases or lengths (n, ...) under a rule, in their unit.
+    """Combine the magnitudes of phases or lengths (n, ...) under a rule; the result is (...), in the same unit.
 
-    `each` takes the largest magnitude, `sum` the sum of the magnitudes, and `rss` the root-sum-square.
+    The rule `each` takes the largest magnitude, `sum` the sum of the magnitudes, and `rss` their root-sum-square. The
+    result is 0 if there are no magnitudes.
     """
     if not len(sizes):
         return 0.0
@@ -170,12 +176,12 @@ def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
 
 
 def largest_signed_sum(vectors: Floats) -> PerCase:
-    """Length of the longest of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
+    """Largest length of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
 
     All sums lie in a polygon that has two sides parallel to each vector. The longest sum is a corner of this polygon.
-    To find the corners, every vector is reversed, if necessary, so that it lies in the upper half plane, and the
-    vectors are sorted by angle. Reversing one vector after another then gives the corners of one half of the polygon.
-    The other half is its mirror image.
+    To find the corners, every vector in the lower half plane is reversed, and the vectors are sorted by angle.
+    Reversing one vector after another then gives the corners of one half of the polygon. The second half is its
+    mirror image.
     """
     x, y = vectors[:, 0], vectors[:, 1]
     is_upper = (y > 0) | ((y == 0) & (x > 0))
@@ -189,18 +195,18 @@ def largest_signed_sum(vectors: Floats) -> PerCase:
 
 # ---------------------------------------------------------------------- notes
 def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
-    """Notes, one for each covariance, on how a combination under the given rule treats its correlations."""
+    """Notes, one for each covariance, on how a combination under a rule treats the correlations."""
     if rule == "rss":
         return tuple(phrases.note("counted-as-one", group=group.id) for group in groups)
     return tuple(phrases.note("correlations-unused", group=group.id) for group in groups)
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
-    """Most probable values of the six errors of a covariance that together cause the phase √(gᵀCg), (6,).
+    """Most probable values of the six errors of a covariance if together they cause the phase √(gᵀCg), (6,).
 
-    The values are Cg/√(gᵀCg). The phase is the quadratic phase of the full model. The errors are along the axes of
-    the covariance's frame, in SI units, and include the coverage factor. If the phase is zero, each value is the
-    sigma of its error.
+    `members` are the six errors in the order of the covariance. The values are Cg/√(gᵀCg). The phase is the
+    first-order quadratic phase of the full model. The values are along the axes of the covariance's frame, in SI
+    units, and include the coverage factor. If the phase is zero, each value is the declared size of its error.
     """
     sizes = np.array([source.declared or 0.0 for source in members])
     phases = sizes * [source.full.qpe for source in members]

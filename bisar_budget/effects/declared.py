@@ -1,12 +1,13 @@
 """Effects of the declared errors according to both models, and the allowable sizes of the errors, for many cases.
 
-A check of a mission has a single case. The published model, Tables I and II and (25) of Rigling & Moses, is linear.
-The full model holds for errors of any size. Its effects are taken as proportional to the error where the second order
-provably does not matter; elsewhere they follow from exact ranges. An error may have either sign, and a bound on its
-size covers both signs. Phases and allowables are therefore those of the worse sign.
+A case is one collection; a check of a mission has a single case. The published model, Tables I and II and (25) of
+Rigling & Moses, is linear. The full model holds for errors of any size. Its effects are taken as proportional to the
+error where the second order provably does not matter. Elsewhere they are computed from exact ranges. An error may
+have either sign, and a bound on its size covers both signs. Phases and allowables are therefore those of the worse
+sign.
 
-Errors are stored in blocks, whose arrays are (errors, cases). With one case, all errors form one block. With
-thousands of cases, each error is a block of its own, so that the arrays in use stay in a processor's cache.
+Errors are stored in blocks, whose arrays are (errors, cases). With a single case, all errors form one block. With
+thousands of cases, each error is a block of its own, so that the arrays in use fit into a processor's cache.
 """
 
 import math
@@ -56,15 +57,20 @@ _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
 class Declared(NamedTuple):
-    """Phases and displacements by errors of a given size, as arrays over cases, or as plain numbers of one case.
+    """Phases and displacements that errors of given sizes cause, in arrays over cases or plain numbers of one case.
 
     `qpe` and `cubic` are the quadratic and cubic phase at the aperture edge for the worse sign of the error. [rad]
-    They have the sign of the first-order phase of the declared error. `displacement` is the displacement east and
-    north for the declared sign, and `opposite` that for the opposite sign. [m] Both are NaN (None in one case) if the
-    matrix Q has no inverse or if no ground point has the range history. In the second case the phases are infinite.
+    They have the sign of the first-order phase of the declared error. `rest` is the rms phase beyond the cubic order
+    for the worse sign. [rad]
 
-    `hidden` is the part of the judged phase that band and turn of the line of sight do not resolve. [rad] `rest` is
-    the rms phase beyond the cubic for the worse sign. [rad]
+    `displacement` is the displacement east and north for the declared sign of the error. `opposite` is the
+    displacement for the opposite sign. [m] Both are NaN (None in one case) for a pure phase error, and in the
+    published model if Q has no inverse. A displacement is also NaN if, for its sign, no ground point has the range
+    history. The phases are then infinite.
+
+    `hidden` is the hidden phase: the quadratic phase that lowers the peak as much as the range error that no
+    displacement can remove, because the bandwidth and the turn of the line of sight do not resolve it. [rad]
+    Autofocus does not correct it.
     """
 
     qpe: Any
@@ -77,15 +83,15 @@ class Declared(NamedTuple):
     def judged(self, gain: PerCase) -> PerCase:
         """Magnitude of the phase that is compared with a limit raised by the gain of autofocus. [rad]
 
-        Autofocus corrects the quadratic phase, but no hidden phase. The judged phase is √(φ² − φ₂² +
-        (φ₂/gain)²)·gain, where φ is the phase of equal loss and φ₂ the quadratic phase.
+        Autofocus corrects the quadratic phase φ₂, but not the hidden phase φₕ. The limit is raised for both by the
+        factor `gain`, so the hidden phase is multiplied by the same factor. The result is √(φ₂² + (gain·φₕ)²).
         """
         phase: PerCase = np.hypot(self.qpe, gain * self.hidden)
         return phase
 
     @property
     def equal_loss(self) -> PerCase:
-        """Quadratic phase with the same peak loss as the quadratic and the hidden phase together. [rad]"""
+        """Quadratic phase that lowers the peak as much as the quadratic and the hidden phase together. [rad]"""
         phase: PerCase = np.hypot(self.qpe, self.hidden)
         return phase
 
@@ -93,8 +99,9 @@ class Declared(NamedTuple):
     def farthest(self) -> Any:
         """Displacement, east and north, for the sign of the error that moves the image farther. [m]
 
-        If that is the sign opposite to the declared one, its displacement is given with reversed sign. None if there
-        is no displacement.
+        If the opposite of the declared sign moves the image farther, the displacement for that sign is returned with
+        its direction reversed. The result is NaN if the displacement for either sign is NaN, and None if either is
+        None.
         """
         if self.displacement is None or self.opposite is None:
             return None
@@ -112,7 +119,7 @@ class Declared(NamedTuple):
         )
 
     def in_one_case(self, case: int = 0) -> "Declared":
-        """Return the effects in one case as plain numbers."""
+        """Return the effects in the case with the given index, as plain numbers."""
         moved, opposite = point(self.displacement, case), point(self.opposite, case)
         qpe, cubic, hidden, beyond_cubic = (
             plain(phase, case) for phase in (self.qpe, self.cubic, self.hidden, self.rest)
@@ -121,17 +128,19 @@ class Declared(NamedTuple):
 
 
 def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector | None:
-    """Ground point of one case, east and north; None if there is no such point. [m]"""
+    """Displacement of the image in one case, east and north, as plain numbers; None if it is NaN. [m]"""
     east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
 
 
 class Allowed(NamedTuple):
-    """Allowable sizes of errors according to one model, (errors, cases); NaN where there is no limit.
+    """Allowable sizes of errors according to one model, (errors, cases); NaN where no size reaches a limit.
 
-    `smallest` is the allowable for all requirements, `quadratic` the allowable for the quadratic phase alone.
+    `smallest` is the allowable for all requirements. `quadratic` is the allowable for the limit of the quadratic
+    phase alone. It equals `smallest` unless it was searched for separately (see `ErrorBlock.allowed`).
+
     `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. If the image
-    ends at that size, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 if there is no limit.
+    ends at that size, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 where no size reaches a limit.
     """
 
     smallest: Floats
@@ -140,14 +149,22 @@ class Allowed(NamedTuple):
 
 
 class ImagePlane(NamedTuple):
-    """Inverse of the matrix Q in each case. It maps constant and linear range error to displacement of the image."""
+    """Inverse of the matrix Q for each case, as adjugate and determinant.
+
+    Q⁻¹ maps the constant [m] and the linear part [m/s] of a range error to the displacement of the image. [m]
+    `is_singular` marks the cases in which Q has no usable inverse.
+    """
 
     adjugate: tuple[tuple[PerCase, ...], tuple[PerCase, ...]]
     determinant: PerCase
     is_singular: PerCaseFlag = False
 
     def displacement(self, effect: Effect, size: PerCase) -> tuple[PerCase, PerCase]:
-        """Displacement on the ground according to (25) with the model's Q; NaN where Q has no inverse. [m]"""
+        """Displacement of the image on the ground, east and north, according to (25). [m]
+
+        `effect` is the effect of one unit of an error, and `size` is the size of the error in this unit. NaN where Q
+        has no usable inverse.
+        """
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
         # Adding 0.0 turns -0.0 into 0.0, so that no minus sign is printed.
@@ -166,9 +183,9 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
 
     Returns the inverse, and the angle between the range and the Doppler gradient of Q. [deg]
 
-    The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. It
-    can therefore be singular where the true gradients are not parallel. It also has no inverse where the look vectors
-    at mid-aperture almost cancel on the ground, because it contains no other look vectors.
+    The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. Q
+    can therefore be singular where the true gradients are not parallel. The only look vectors in Q are those at
+    mid-aperture. Where they almost cancel on the ground, Q has no usable inverse either.
     """
     ground: list[PerCase] = []
     for path in geometry.both:
@@ -186,12 +203,15 @@ class OwnPlane(NamedTuple):
     is_singular: PerCaseFlag = False
 
     def displacement(self, effect: FullEffect, size: PerCase) -> tuple[PerCase, PerCase]:
-        """Displacement on the ground, east and north. [m]"""
+        """Displacement of the image on the ground, east and north, by an error of the given size. [m]
+
+        `effect` is the effect of one unit of the error.
+        """
         return effect.east * size + 0.0, effect.north * size + 0.0
 
 
 class ErrorBlock:
-    """A block of errors in all cases. Its arrays are (errors, cases).
+    """A block of errors with their effects in all cases, in arrays (errors, cases).
 
     Attributes
     ----------
@@ -225,9 +245,10 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """First-order effects per unit of each error, (3, errors, cases).
+        """Magnitudes of the first-order effects per unit of each error, (3, errors, cases).
 
-        The effects are the magnitudes of the judged phase [rad], the cubic phase [rad] and the displacement [m].
+        The effects are the judged phase [rad], the cubic phase [rad] and the displacement [m]. An unknown
+        displacement counts as 0.
         """
         if model not in self._per_unit:
             effect = self.effects[model]
@@ -240,7 +261,10 @@ class ErrorBlock:
 
     @cached_property
     def hidden_per_unit(self) -> Floats:
-        """First-order hidden phase and rms beyond the cubic per unit of each error, (2, errors, cases). [rad]"""
+        """First-order hidden phase and rms phase beyond the cubic order per unit of each error. [rad/unit]
+
+        The array is (2, errors, cases). Both phases are 0 for errors that do not displace the image.
+        """
         phases = np.zeros((2, *self.declared.shape))
         if self.moves:
             remaining = self.left_per_unit(self.moves)
@@ -248,9 +272,9 @@ class ErrorBlock:
         return phases
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
-        """First-order range error at the nodes that remains at the image point, (errors, nodes, cases). [m/unit]
+        """Range error at the nodes that remains at the first-order image point, (errors, nodes, cases). [m/unit]
 
-        `indices` are the errors to evaluate.
+        `indices` are the indices of the errors in the block.
         """
         full = self.effects["full"]
         if self.cases == 1:
@@ -262,9 +286,9 @@ class ErrorBlock:
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
-        """Upper bounds of the second-order part of the effects of errors of the given sizes, (3, errors, cases).
+        """Upper bounds of the second-order parts of the effects of errors of the given sizes, (3, errors, cases).
 
-        The effects are judged phase [rad], cubic phase [rad] and displacement [m].
+        The effects are the judged phase [rad], the cubic phase [rad] and the displacement [m].
         """
         strays = self._strays(size)
         return self.table.per_metre * self._grows(size, strays) + self.table.per_stray * strays
@@ -272,8 +296,8 @@ class ErrorBlock:
     def _strays(self, size: Floats) -> Floats:
         """Upper bound of the distance between the image point and its first-order position, (errors, cases). [m]
 
-        An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. Where
-        this change varies over the aperture like the remaining range error ρ, the minimum of the phase variance V is
+        An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. If this
+        change varies over the aperture like the remaining range error ρ, the minimum of the phase variance V is
         displaced from the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges` defines V, H
         and ⟨ ⟩.
         """
@@ -285,9 +309,11 @@ class ErrorBlock:
         return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
     def _bent(self, size: Floats) -> PerCase:
-        """Largest deviation of the motion by an error from the motion proportional to its size, (errors, cases). [m]
+        """Upper bound of the part of a platform's motion that is not proportional to the error's size. [m]
 
-        Only a time tag error has such a deviation. If the direct path is the clock, the deviation is doubled.
+        Only a time tag error has such a part: its motion follows the path, which may turn. The bound is the distance
+        from `DeclaredErrors.bent`, (errors, cases). It is doubled if the direct path synchronizes the clocks. The
+        result is the number 0 if the block has no time tag error.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
@@ -298,15 +324,18 @@ class ErrorBlock:
         return bends
 
     def _grows(self, size: Floats, strays: Floats) -> Floats:
-        """Upper bound of the range error that the second order of errors adds, (errors, cases). [m]
+        """Upper bound of the second-order part of the range error, (errors, cases). [m]
 
-        With r̃ the motion of a platform, x̂ the displacement of the image and P⊥ the projection across the line of
-        sight, the second order of two platforms is −Σ|P⊥(r̃ − x̂)|²/2R. It is at most |r̃ − x̂|²/R, with the range R
-        of the nearer platform. With a direct path the second order of the ranges is bounded separately for each
-        platform, because for a distant platform much of it cancels to first order. The second order of the distance D
-        between the platforms, |P⊥r̃|²/2D, has the opposite sign, so the sum is not larger than the larger term.
+        `strays` is the upper bound from `_strays`. [m]
 
-        `strays` is the distance from `_strays`. [m]
+        Let r̃ be the motion of a platform, x̂ the displacement of the image, and P⊥ the projection across the line of
+        sight. The second order for both platforms is −Σ|P⊥(r̃ − x̂)|²/2R. Its magnitude is at most |r̃ − x̂|²/R, with
+        the range R of the nearer platform.
+
+        With a direct path the second order of the ranges is bounded separately for each platform, because for a
+        distant platform much of it cancels to first order. The second order of the distance D between the platforms,
+        |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore not larger than the larger of both
+        terms.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -323,7 +352,11 @@ class ErrorBlock:
         return np.asarray(growth + bent)
 
     def is_large(self, size: Floats) -> Booleans:
-        """Mark the errors whose effects may not be proportional to their size, by the second-order bounds."""
+        """Mark the errors of the given sizes whose effects may not be proportional to their size, (errors, cases).
+
+        An error is marked if an upper bound from `adds` exceeds both a small fixed amount and the fraction
+        `SECOND_ORDER_FRACTION` of the first-order effect. Errors that do not displace the image are never marked.
+        """
         size = np.abs(size)
         large = np.zeros(size.shape, dtype=bool)
         for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
@@ -332,7 +365,7 @@ class ErrorBlock:
 
     @cached_property
     def is_declared_large(self) -> Booleans:
-        """Mark the declared errors whose effects may not be proportional to their size."""
+        """Mark the declared errors whose effects may not be proportional to their size, (errors, cases)."""
         return self.is_large(self.declared)
 
     @cached_property
@@ -343,7 +376,10 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- errors of any size
     def does(self, model: str, size: Floats) -> Declared:
-        """Effects of errors of given sizes in a model, (errors, cases); NaN for an error without a size."""
+        """Effects of errors of the given sizes (errors, cases) according to a model; NaN where the size is NaN.
+
+        In the full model the effects of large errors are computed from exact ranges.
+        """
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
@@ -359,7 +395,7 @@ class ErrorBlock:
         return effects
 
     def _exactly(self, effects: Declared, size: Floats, is_large: Booleans) -> None:
-        """Replace the effects of the errors marked in `is_large` by the results of exact ranges."""
+        """Replace the effects of the errors marked in `is_large` by the results from exact ranges, in place."""
         sizes = size[is_large]
         points = self.followed(is_large, np.abs(sizes))
         ahead, back = (np.where(sizes > 0, *pair) for pair in (points, points[::-1]))
@@ -382,10 +418,12 @@ class ErrorBlock:
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
     def followed(self, errors: Booleans, sizes: Floats) -> Floats:
-        """Results of exact ranges for the errors marked in `errors`, at the given sizes (n,).
+        """Effects, from exact ranges, of the n errors that are marked in `errors`, for each sign.
 
-        Returns an array (2, rows, n). The first axis is the positive and the negative sign. The rows are those of
-        `point_paths.ROWS`.
+        `sizes` (n,) are the magnitudes of their sizes.
+
+        Returns an array (2, rows, n): first the positive, then the negative sign of the errors. The rows are those of
+        `point_paths.ROWS`. They are NaN where no ground point has the range history.
         """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -394,7 +432,7 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Index of the lane of each error with positive sign in each case, (errors, cases).
+        """Index of the lane that an error with positive sign has in each case, (errors, cases).
 
         A lane is one error with one sign in one case. The lanes of an error's negative sign follow those of its
         positive sign.
@@ -409,9 +447,9 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """Paths of the image point, as the size grows, for the errors that displace it.
+        """Paths of the image point as errors grow, for the errors of the block that displace it.
 
-        For each error, the positive sign comes before the negative sign.
+        For each error, the paths for the positive sign come before those for the negative sign.
         """
         if self._follows is None:
             table, full = self.table, self.effects["full"]
@@ -423,14 +461,14 @@ class ErrorBlock:
         return self._follows
 
     def forget(self) -> None:
-        """Free the memory of the paths, which are large."""
+        """Release the paths of the image point to free their memory, which is large."""
         self._follows = None
 
     @cached_property
     def quadratic_by_sign(self) -> Floats:
         """Exact quadratic phases of the declared errors for each sign, positive first, (2, errors, cases). [rad]
 
-        NaN for errors whose first-order effect is sufficient, and for errors that leave no image.
+        NaN for errors whose first-order effect is accurate enough, and for a sign of an error that leaves no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
@@ -442,9 +480,11 @@ class ErrorBlock:
     # ---------------------------------------------------------------- allowable sizes
     @cached_property
     def farthest(self) -> Floats:
-        """Size of each error at which the search for a limit stops, in the unit of the error, (errors, cases).
+        """Size of each error at which the search for its allowable stops, in the unit of the error, (errors, cases).
 
-        A larger path error would not be a navigation error. Infinite for an error that has no effect at any size.
+        At this size the motion of a platform reaches `FARTHEST_RANGE_FRACTION` of its slant range. A larger error
+        would not be a navigation error. A clock error of this size leaves no image. The size is infinite for an error
+        that does not displace the image.
         """
         slant = [path.slant_range for path in self.table.geometries.both]
         size = np.full(self.declared.shape, math.inf)
@@ -469,9 +509,10 @@ class ErrorBlock:
         model : str
             `published` or `full`.
         limits : three of (errors, cases) or (cases,) or None
-            Limits of quadratic phase, cubic phase [rad] and displacement [m]; None: no limit.
+            Limits of quadratic phase [rad], cubic phase [rad] and displacement [m]; None means no limit.
         is_complete : bool
-            Also search for the size that the quadratic phase alone allows.
+            Also search for the allowable that follows from the limit of the quadratic phase alone. If false,
+            `quadratic` of the result equals `smallest`.
         """
         limit = np.array([self._limit(requirement, sizes) for requirement, sizes in enumerate(limits)])
         per_unit = self.per_unit(model)
@@ -493,7 +534,10 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
     def ends_image(self, size: Floats) -> Booleans:
-        """Mark the errors for which the image ends at the given allowable size, found by an earlier search."""
+        """Mark the errors that leave no image if they are larger than the given allowable size, (errors, cases).
+
+        `size` (errors, cases) must come from an earlier search. Nothing is marked before the first search.
+        """
         ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
             sizes = size[self.moves]
@@ -502,23 +546,24 @@ class ErrorBlock:
         return ends_there
 
     def _limit(self, requirement: int, limit: PerCase | None) -> Floats:
-        """Limit of one requirement for each error; NaN where there is no limit.
+        """Limit of a requirement, given by its index, for each error, (errors, cases); NaN where there is no limit.
 
-        A pure phase error has a limit of the quadratic phase only.
+        For a pure phase error only the quadratic phase has a limit.
         """
         limit = math.nan if limit is None else limit
         limits = np.broadcast_to(limit, self.declared.shape)
         return limits if requirement == 0 else np.where(self.is_motion, limits, math.nan)
 
     def _searched(self, limit: Floats, small: Floats, required: Sequence[int], *, is_complete: bool) -> Floats:
-        """Smallest sizes, of either sign, at which errors reach their limits, (3, errors, cases).
+        """Smallest sizes, of either sign, at which errors reach each of their limits, (3, errors, cases).
 
-        Infinite where no size reaches the limit. `small` are the sizes according to the first-order effects.
-        `required` are the indices of the requirements that have a limit.
+        `limit` has the limits of the three requirements, and `small` the sizes that follow from the first-order
+        effects, both (3, errors, cases). `required` are the indices of the requirements that have a limit. The result
+        is infinite where the search finds no size that reaches the limit.
 
-        The search ends at the size that moves the platform by more than a tenth of the slant range, or at the
-        declared size if that is larger. It also ends at the size that another limit allows, except for the quadratic
-        phase if `is_complete`. The limit that is most likely to bind is searched first.
+        The search ends at the size from `farthest`, or at the declared size if that is larger. It also ends at the
+        allowable that an earlier limit has already set; if `is_complete`, this does not apply to the limit of the
+        quadratic phase. The limit that is most likely to bind is searched first.
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         smallest = np.full(small.shape, math.inf)
@@ -555,18 +600,20 @@ class ErrorBlock:
 
 
 def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
-    """Shift by a time tag error less its first-order part `tag_s`·velocity. [m]"""
+    """Shift of a platform by a time tag error, minus its first-order part `tag_s`·velocity. [m]"""
     (x, y, z), (u, v, w) = shift, velocity
     return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
 
 
 class DeclaredErrors:
-    """Errors of cases that need the same number of nodes, with their effects and allowable sizes.
+    """Errors of a mission in many cases, with their effects and allowable sizes.
+
+    All cases need the same number of nodes.
 
     Parameters
     ----------
     mission : Mission
-        Some of its numbers may be arrays (cases,).
+        The mission. Some of its numbers may be arrays (cases,).
     cases : int
         Number of cases.
     geometries : BistaticGeometry
@@ -578,7 +625,7 @@ class DeclaredErrors:
     gain : float or (cases,)
         Factor by which autofocus raises the limit of quadratic phases. It does not apply to hidden phases.
     is_complete : bool
-        Compute all numbers of each row, in the same way for any number of cases.
+        Whether to compute all numbers of each row, in the same way for any number of cases.
 
     Attributes
     ----------
@@ -622,13 +669,13 @@ class DeclaredErrors:
         self._farthest: dict[tuple[str, int], tuple[Floats, Floats]] = {}
 
     def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
-        """Array with one number for each case, (cases,)."""
+        """Return a value as an array of numbers, one per case, (cases,); None becomes NaN."""
         return np.full(self.cases, value, dtype=float)
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
-        """Unit errors as lanes, ordered by error, then sign, then case.
+        """Arrange one unit of each error, with each of the given signs, in lanes.
 
-        A lane is one error with one sign in one case. `signs` are the signs of each error.
+        A lane is one error with one sign in one case. The lanes are ordered by error, then by sign, then by case.
         """
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
@@ -643,9 +690,9 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
 
     def _of_lanes(self, values: Any, signs: int) -> Any:
-        """Repeat values (..., errors, cases) for each of `signs` signs, (..., lanes).
+        """Arrange values (..., errors, cases) in lanes, (..., lanes), with a copy for each of `signs` signs.
 
-        A value for a single error in a single case is shared by all lanes and becomes (..., 1).
+        A value for a single error in a single case is the same for all lanes. It becomes (..., 1).
         """
         *more, errors, cases = values.shape
         if errors == cases == 1:
@@ -653,9 +700,11 @@ class DeclaredErrors:
         return np.broadcast_to(values[..., None, :], (*more, errors, signs, self.cases)).reshape(*more, -1)
 
     def edge_of(self, error: ErrorSource) -> PerCase:
-        """Position error at the aperture edge per unit of an error. [m/unit]
+        """Largest position error of a platform within the aperture per unit of an error. [m/unit]
 
-        For an error of both platforms it is the larger of the two position errors. It is 0 for a clock error.
+        Errors of position, velocity and acceleration are evaluated at the aperture edge. For a time tag error, or a
+        motion that is given at the nodes, it is the largest value at the nodes. If the error moves both platforms, it
+        is the larger value of the two. It is 0 for an error that moves no platform.
         """
         if not error.is_time_tag and error.shifts is None:
             return self.edge.get(error.unit, 0.0)
@@ -663,9 +712,11 @@ class DeclaredErrors:
         return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Deviation of the shift by a time tag error from a shift along the velocity, worse sign, (cases,). [m]
+        """Largest distance between the shift by a time tag error and the first-order part of the shift, (cases,). [m]
 
-        For an error of both platforms, the deviations of both are added.
+        The distance is the largest within the aperture. The first-order part is the size of the error times the
+        velocity. The result is for the worse sign of the error. For an error of both platforms, the largest distances
+        of both are added.
         """
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
@@ -677,19 +728,20 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Power of slow time in proportion to which the position error of a platform grows.
+        """Exponent of slow time to which the position error due to an error is proportional.
 
-        It is -1 for an error that moves no platform, and 0 for an error whose motion is given at the nodes.
+        It is -1 for an error that moves no platform. It is 0 for a time tag error and for a motion that is given at
+        the nodes, because their directions contain the change over the aperture.
         """
         if not error.platforms:
             return -1
         return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
-        """Position error at the nodes per unit of an error, (nodes, cases). [m/unit]
+        """Position error at the nodes per unit of an error, along its direction, (nodes, cases). [m/unit]
 
-        For an error that moves no platform it is the range error. For an error whose motion is given at the nodes it
-        is 1.
+        For a time tag error, or a motion that is given at the nodes, the result is 1, because the direction contains
+        the motion. For an error that moves no platform the result is the range error.
         """
         exact = self.exact
         if order >= 0:
@@ -700,26 +752,30 @@ class DeclaredErrors:
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
-        """The block that contains an error, and the error's index in the block."""
+        """Return the block that contains an error, and the error's index in the block."""
         block, index = self._place[error.id]
         return self.blocks[block], index
 
     def does(self, model: str, error: ErrorSource) -> Declared:
-        """Effect of a declared error in a model, (cases,)."""
+        """Phases and displacements that a declared error causes according to a model, in arrays (cases,)."""
         block, index = self._place[error.id]
         return self.of_block(model, block).of(index)
 
     def of_block(self, model: str, block: int) -> Declared:
-        """Effects of the declared errors of a block in a model, (errors, cases)."""
+        """Phases and displacements that the declared errors of a block cause according to a model, (errors, cases).
+
+        `block` is the index of the block. The results are kept for later calls.
+        """
         key = (model, block)
         if key not in self._does:
             self._does[key] = self.blocks[block].does(model, self.blocks[block].declared)
         return self._does[key]
 
     def farthest(self, model: str, error: ErrorSource) -> tuple[Floats, Floats]:
-        """Displacement by a declared error for the sign that moves the image farther, (cases,) each. [m]
+        """Displacement by a declared error, east and north, for the sign that moves the image farther. [m]
 
-        See `Declared.farthest`, which is computed for all errors of a block at once.
+        Each component is (cases,). See `Declared.farthest`. The displacement is computed for all errors of a block at
+        once.
         """
         block, index = self._place[error.id]
         key = (model, block)
@@ -729,29 +785,31 @@ class DeclaredErrors:
         return east[index], north[index]
 
     def is_large(self, error: ErrorSource) -> Booleans:
-        """Cases in which the effects of a declared error may not be proportional to its size."""
+        """Mark the cases in which the effects of a declared error may not be proportional to its size."""
         block, index = self.block_of(error)
         return np.asarray(block.is_declared_large[index])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Exact quadratic phases of a declared error for each sign, positive first, (2, cases). [rad]
 
-        NaN where the first-order effect is sufficient or the error leaves no image.
+        NaN where the first-order effect is accurate enough, or where the error with this sign leaves no image.
         """
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
-        """Cases in which the model that does not gate makes a result doubtful.
+        """Mark the cases in which a model other than the gating model makes a result doubtful.
 
-        `is_over` marks the cases in which a limit is exceeded in that model.
-
-        With a direct path the published model never does, because it does not include the direct path.
+        `is_over` marks the cases in which a limit is exceeded in that model. With a direct path the published model
+        makes no result doubtful, because it does not include the direct path.
         """
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Note on why the image has no displacement in a model in a case; empty if it has one."""
+        """Note on the reason why a model gives no displacement of the image in a case.
+
+        Empty if the model gives a displacement.
+        """
         if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
         degrees = plain(self.published_angle_deg, case)
@@ -763,7 +821,9 @@ class DeclaredErrors:
 def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
     """Platforms that each error moves, and the directions of the motion, in the form that `Lanes` uses.
 
-    Returns flags, 1 for a platform that is moved, (2, errors, 1), and directions, (2, 3, nodes, errors, cases).
+    Returns two arrays. The first is (2, errors, 1), with 1 for a platform that the error moves and 0 for any other.
+    The second has the directions, (2, 3, nodes, errors, cases). Its axes of nodes and cases have length 1 if no
+    direction depends on them.
     """
     ways = [
         (platform, index, error.way_of(platform))
@@ -782,7 +842,7 @@ def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
 
 
 class Model:
-    """One model of a single case, which evaluates one error at a time.
+    """The published or the full model for a single case, which evaluates one error at a time.
 
     Its methods take and return plain numbers. A missing value is None.
     """
@@ -794,38 +854,40 @@ class Model:
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect | FullEffect:
-        """Effect of one unit of an error. In the full model it is the first-order effect."""
+        """Effect of one unit of an error according to this model; the full model gives the first-order effect."""
         return source.effect if self.is_published else source.full
 
     def displacement(self, effect: Effect | FullEffect, size: float) -> GroundVector | None:
-        """Displacement on the ground, east and north, by an error of a given size, from its first-order effect. [m]
+        """Displacement of the image on the ground, east and north, from the first-order effect of an error. [m]
 
-        In the published model it follows from (25). None where Q has no inverse.
+        `effect` is the effect of one unit, and `size` is the size of the error in this unit. In the published model
+        the displacement follows from (25). It is None if the published Q has no usable inverse.
         """
         return point(self.plane.displacement(effect, size))
 
     def equation(self, source: ErrorSource) -> str:
-        """Name of the equation or table from which the effect of an error follows."""
+        """Name of the equation, table or model from which the effect of an error follows."""
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Note on why the quadratic phase of an error sets no limit."""
+        """Note on the reason why no size of an error reaches a limit of the quadratic phase."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
 
     def does(self, source: ErrorSource, size: float) -> Declared:
-        """Effect of an error of a given size, in the unit of the error."""
+        """Phases and displacements that an error of the given size causes; `size` is in the unit of the error."""
         block, index = self.errors.block_of(source)
         sizes = np.full(block.declared.shape, math.nan)
         sizes[index] = size
         return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
-        """Smallest size, of either sign, at which an error reaches a limit, and the requirement it reaches.
+        """Smallest size, of either sign, at which an error reaches a limit, and the requirement that sets this size.
 
-        Both are None if no size reaches a limit. `limits` are the limits of quadratic phase [rad], cubic phase [rad]
-        and displacement. [m]
+        The requirement is an entry of `LIMITING_REQUIREMENTS`, or `END_OF_IMAGE` if a larger error leaves no image.
+        Both results are None if no size reaches a limit. `limits` are the limits of quadratic phase [rad], cubic
+        phase [rad] and displacement [m]; None means no limit.
         """
         block, index = self.errors.block_of(source)
         limits_of_block: list[PerCase | None] = []
@@ -838,13 +900,16 @@ class Model:
         return (None, None) if math.isnan(size) else (size, (*LIMITING_REQUIREMENTS, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
-        """Smallest size, of either sign, at which an error reaches one limit; None if there is no such size."""
+        """Smallest size, of either sign, at which an error reaches the limit of a requirement.
+
+        None if no size reaches the limit.
+        """
         return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
-        """Size at which an error would reach a limit according to its first-order effect.
+        """Size at which an error would reach a limit if its effects were proportional to its size.
 
-        Infinite if the error has no effect on the limited quantity.
+        The size is infinite if the error has no effect on the limited quantity.
         """
         block, index = self.errors.block_of(source)
         per_unit = float(block.per_unit(self.name)[LIMITING_REQUIREMENTS.index(requirement), index, 0])
@@ -856,15 +921,18 @@ class Model:
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
-        """Whether the image ends at the given allowable size, found by an earlier search.
+        """Whether an error that is larger than the given allowable size leaves no image.
 
-        Always false in the published model.
+        An earlier search must have found the size. Always false in the published model.
         """
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
-        """Whether the effects of an error are proportional to its size up to the size that reaches a limit."""
+        """Whether the effects of an error are proportional to its size up to the size that reaches a limit.
+
+        Always true in the published model.
+        """
         block, index = self.errors.block_of(source)
         requirement_index = LIMITING_REQUIREMENTS.index(requirement)
         per_unit = block.per_unit(self.name)[requirement_index]
@@ -875,12 +943,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether the effects of an error of a given size are proportional to it, by the second-order bounds."""
+        """Whether the second-order bounds show that the effects of an error are proportional to its given size."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement by an error of a signed size, from exact ranges; None without an image point."""
+        """Phases and displacement by an error of a signed size, from exact ranges; None if no image point is left."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -889,17 +957,23 @@ class Model:
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
-        """Largest magnitude of the range error at the nodes at the scene centre, per unit of an error. [m/unit]"""
+        """Largest magnitude at the nodes of the first-order range error at the scene centre. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
     def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
-        """Range error at the nodes that an error of a given size leaves at a ground point. [m]"""
+        """Range error at the nodes that an error of a given size leaves at a ground point, (nodes,). [m]
+
+        `point` is the ground point, east and north of the scene centre. [m]
+        """
         remaining = self.exact.left_over(self.errors.lanes(source), np.array([size]), point)
         range_error: list[float] = remaining[:, 0].tolist()
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """Range error at the nodes that an error of a given size leaves at its image point, to first order. [m]"""
+        """First-order range error at the nodes that an error leaves at its image point, (nodes,). [m]
+
+        `size` is the size of the error in its unit.
+        """
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
         remaining = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north

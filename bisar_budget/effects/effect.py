@@ -34,16 +34,17 @@ MOTION = tuple(kind.name for kind in STATE_KINDS)
 
 
 class Subject(NamedTuple):
-    """Subject of a row or an error: owner, kind and axis. The function `subject` creates it with its id.
+    """Subject of a row or an error: owner, kind and axis.
 
-    Code reads these fields and never parses an id. `owner` owns the share of the budget that the error uses:
-    transmitter, receiver, clock, or mission if no part of the system owns the error. `kind` is position, velocity,
-    acceleration, time_tag, vibration, timing, propagation, dispersion, terrain, other, specification, or the name of
-    a sum.
+    The function `subject` creates it together with its id. Code reads these fields and never parses an id. `owner`
+    owns the share of the budget that the error uses. It is transmitter, receiver or clock, or mission if no part of
+    the system owns the error. `kind` is the name of a kind in `error_kinds`: a kind of error, such as position,
+    velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a kind of sum, such as
+    dispersion or specification.
 
-    `axis` is the axis of `frame`, the term of the clock, the name of a declared value of a sensor or of the air, the
-    name of an error determined elsewhere, the specified key, or the type of a vibration. `entry` is the index of the
-    error in a list of the file.
+    The meaning of `axis` depends on the kind. It is the axis of `frame`, the term of the clock, the name of a
+    declared value of a sensor or of the air, the name of an error determined elsewhere, the specified key, or the
+    type of a vibration. `entry` is the index of the error in a list of the file.
     """
 
     id: str
@@ -55,12 +56,12 @@ class Subject(NamedTuple):
 
     @property
     def facts(self) -> ErrorKind:
-        """The kind itself, with all that is known about it."""
+        """Object of the kind, with the properties that commands need."""
         return kind_of(self.kind)
 
     @property
     def source_kind(self) -> SourceKind:
-        """The kind itself, of the subject of an error."""
+        """Object of the kind, if the subject belongs to an error and not to a sum."""
         facts = self.facts
         assert isinstance(facts, SourceKind), "the subject is that of a sum"
         return facts
@@ -68,7 +69,7 @@ class Subject(NamedTuple):
 
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
-    """Create the subject of an error or a sum, with the id that the contract defines."""
+    """Create the subject of an error or a sum, together with the id of its row."""
     return Subject(kind_of(kind).row_id(owner, axis, entry), owner, kind, axis, frame, entry)
 
 
@@ -80,9 +81,9 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Notes on values of parts, such as sensors, that the file overrides.
+    """Notes on values of a part, such as a sensor, that a key of the mission file replaces; one note per value.
 
-    Only the values named in `figures` are included, or all values if none is named.
+    `figures` are the keys of the values to include. Without any key, all values in `overridden` are included.
     """
     return tuple(
         phrases.note("overrides-a-part", key=f"platforms.{platform}.{figure.key}", text=figure.text, part=figure.part)
@@ -92,14 +93,20 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 
 def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
-    """Plain number of one case, given by its index. A single number holds for every case."""
+    """Convert a value to the plain number of one case, given by its index.
+
+    A single number, or an array with a single entry, holds for every case.
+    """
     if not isinstance(column, np.ndarray):
         return float(column)
     return float(column.item(case if column.size > 1 else 0))
 
 
 def _plain_way(component: PerCase) -> PerCase:
-    """Component of a direction in one case. A component that varies over the nodes stays an array."""
+    """Convert a component of a direction to the plain number of a single case.
+
+    A component that varies over the nodes stays an array.
+    """
     return component if np.ndim(component) > 1 else plain(component)
 
 
@@ -109,25 +116,29 @@ def _plain_ways(direction: Vectors) -> Vectors:
 
 
 class ErrorSource(NamedTuple):
-    """One error: its subject, its declared size, and the effect of one unit. Numbers are plain, or arrays over cases.
+    """One error: its subject, its declared size, and the effect of one unit.
 
-    `declared` is signed and includes the coverage factor. It is None if the file declares no size. `is_independent`
-    marks the errors as the file states them. Sums and root-sum-squares include only these errors, so that an error
-    stated along the track is not counted again by its components along the scene's axes.
+    Numbers are plain, or arrays over cases. `declared` is signed and includes the coverage factor. It is None if the
+    file declares no size. `is_independent` is true for an error along an axis in which the file states it. Sums and
+    root-sum-squares include only such errors. An error stated along the track is therefore not counted again by its
+    components along the scene's axes.
 
-    `direction` is a unit vector of the scene, or zero for an error that is no motion. For an error of the mission,
-    `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
+    `direction` is a unit vector in the axes of the scene, or zero for an error that is no motion. For an error of the
+    mission, `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
     direction of a time tag error is the velocity at the nodes of the aperture, (nodes, cases), along which a small
     time tag error moves the platform. [m/s]
 
-    `clock` holds the coefficients t̃₀ … t̃₃ of one unit of a clock error. They are zero if synchronization removes
-    the error. It is None for any other error.
+    `clock` has the coefficients t̃₀ … t̃₃ of one unit of a clock error. They are zero if synchronization removes the
+    error. `clock` is None for any other error.
 
     `shifts` are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for each axis.
-    [m] They are set for a registered kind of error, and if a platform is in free fall, where the error follows the
-    dynamics of the orbit. In free fall `rates` are the velocities at mid-aperture of position errors in `ric`, which
-    have no velocity relative to the stars. [m/s] Both are None otherwise. `is_registered` marks an error of a
-    registered kind, which moves its platform by `shifts` whether the platform is in free fall or not.
+    [m/unit] They are set for a registered kind of error. They are also set if a platform is in free fall, where the
+    motion follows the dynamics of the orbit. Otherwise they are None. `is_registered` marks an error of a registered
+    kind, which moves its platform by `shifts` whether the platform is in free fall or not.
+
+    `rates` are velocities at mid-aperture per unit of a position error in the frame `ric`, if a platform is in free
+    fall. Such an error has no velocity relative to the stars, so it has a velocity in the axes of the scene.
+    [(m/s)/unit] `rates` is None for all other errors.
     """
 
     subject: Subject
@@ -154,7 +165,7 @@ class ErrorSource(NamedTuple):
         return self.subject.id
 
     def in_one_case(self) -> "ErrorSource":
-        """Return the same error with plain numbers in place of arrays of one case."""
+        """Return the error for a single case, with plain numbers in place of arrays over cases."""
         effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
@@ -170,20 +181,20 @@ class ErrorSource(NamedTuple):
         )
 
     def direction_of(self, platform_index: int) -> Vectors:
-        """Direction in which the error moves a platform."""
+        """Direction in which the error moves a platform, given by its index; the velocity for a time tag error."""
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
 
     def way_of(self, platform_index: int) -> Any:
-        """Motion of a platform at each node per unit of the error, if the platform follows an orbit or a path.
+        """Motion of a platform at the nodes per unit of the error, from `shifts`.
 
-        Otherwise it is the direction of the error.
+        If `shifts` is not set, the result is the direction of the error.
         """
         return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
 
     def state_of(self, platform_index: int) -> tuple[Any, Any, Any]:
         """Position, velocity and acceleration error of a platform at mid-aperture per unit of the error.
 
-        The units are m, m/s and m/s².
+        The three vectors are in m, m/s and m/s² per unit.
         """
         vectors: list[Any] = [NOWHERE, NOWHERE, NOWHERE]
         if self.rates is not None:
@@ -193,12 +204,12 @@ class ErrorSource(NamedTuple):
 
     @property
     def owner(self) -> str:
-        """Owner of the share that the error counts against: transmitter, receiver, clock or mission."""
+        """Owner of the share that the error uses: transmitter, receiver, clock or mission."""
         return self.subject.owner
 
     @property
     def is_motion(self) -> bool:
-        """Whether the error moves platforms or shifts the clock. It is false for a pure phase error."""
+        """Whether the error moves platforms or shifts the clock; false for a pure phase error."""
         return self.unit != "rad"
 
     @property
@@ -211,19 +222,19 @@ class ErrorSource(NamedTuple):
 
     @property
     def kind(self) -> SourceKind:
-        """The kind of the error, with all that is known about it."""
+        """Object of the error's kind, with the properties that commands need."""
         return self.subject.source_kind
 
     @property
     def motion(self) -> Motion | None:
-        """Motion of the platform per unit, which a registered kind of error states; None for any other kind."""
+        """Function for the motion of a platform per unit of a registered kind of error; None for any other kind."""
         return self.kind.moved if self.is_registered and isinstance(self.kind, MotionKind) else None
 
     @property
     def is_covered(self) -> bool:
         """Whether the declared size includes the coverage factor.
 
-        It does not for terrain and for a pure phase error.
+        False for terrain and for a pure phase error.
         """
         return self.kind.is_covered
 
@@ -231,25 +242,26 @@ class ErrorSource(NamedTuple):
     def is_heard(self) -> bool:
         """Whether the data contain the error.
 
-        They do not contain a clock error that the synchronization removes completely.
+        False for a clock error that the synchronization removes completely.
         """
         return self.clock is None or any(map(np.any, self.clock))
 
     @property
     def displaces(self) -> bool:
-        """Whether the error is one of motion, or a clock error that the data contain."""
+        """Whether the error can displace the image: a motion error, or a clock error that the data contain."""
         return self.is_motion and self.is_heard
 
     @property
     def is_position(self) -> bool:
-        """Whether the error is one of the measured path of one platform or of both platforms."""
+        """Whether the error acts as a position error of one platform or of both platforms."""
         return self.is_motion and self.clock is None
 
     @property
     def platforms(self) -> tuple[int, ...]:
-        """Indices of the platforms whose position has the error.
+        """Indices of the platforms whose positions have the error: 0 for the transmitter, 1 for the receiver.
 
-        An error of the mission is in the positions of both platforms.
+        An error of the mission is in the positions of both platforms. The result is empty for an error that moves no
+        platform.
         """
         return _PLATFORMS_OF.get(self.owner, (0, 1)) if self.is_position else ()
 
@@ -264,7 +276,7 @@ PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they t
 
 
 class LinePiece(NamedTuple):
-    """Piece of a range error, approximated by a straight line.
+    """Piece of a range error over the aperture, approximated by a straight line.
 
     `time` is the centre τ_i of the piece, counted from mid-aperture. [s] `value` (27) [m] and `slope` (28) [m/s] are
     the range error of the line and its rate at this time.
@@ -276,7 +288,7 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name of the range and Doppler gradients from which a model forms Q_i: as printed, or true."""
+    """Name of the gradients of range and Doppler from which a model forms Q_i: as printed in the paper, or true."""
     return PRINTED if model == "published" else TRUE
 
 
@@ -292,15 +304,15 @@ def indicated_point(
     piece : LinePiece
         Piece of the range error, without the range history of the scatterer itself.
     model : str
-        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and constant ratios of speed
-        to range. Any other name: the true gradients of the lines of sight at τ_i.
+        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and the slant ranges of
+        mid-aperture. Any other name: the true gradients of the lines of sight at τ_i.
     seen_from : (2,)
         Position of the scatterer, east and north. [m]
 
     Returns
     -------
     (2,)
-        East and north.
+        East and north of the indicated point.
 
     Raises
     ------

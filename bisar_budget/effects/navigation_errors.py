@@ -1,8 +1,8 @@
 """Random navigation errors: errors of inertial sensors, lever arms, and noise of a position.
 
-A bias of an inertial sensor is one constant error over the aperture; noise is an independent error at every moment.
-The motion errors that both cause are zero at mid-aperture, because the mission declares the position and velocity
-errors at that moment separately, as aiding leaves them. A tilt also rotates the lever arm, if the file states one. An
+A bias of an inertial sensor is a constant error over the aperture. Noise is an independent error at every moment. The
+motion errors that both cause are zero at mid-aperture, because the mission declares the position and velocity errors
+at that moment separately, as aiding leaves them. A tilt also rotates the lever arm, if the file states an arm. An
 attitude error rotates the arm over the whole aperture, mid-aperture included.
 
 A lever arm leads from the reference point of the navigation to the antenna's phase centre, in axes that turn with the
@@ -10,10 +10,10 @@ body. These axes are along, cross and up of the velocity at every moment of the 
 are the scene's axes. The antenna's position is the navigation's position plus R(τ)·l, with the arm l and the rotation
 R of the body. An error δl of the arm turns with the body, R(τ)·δl. It displaces the image, and defocuses it if the
 body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction in space, like the
-error of a strapdown navigation with perfect gyros. The same holds for its effect on the specific force. A gyro bias ε
-makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
+error of a strapdown navigation with perfect gyros. It does so as well when it acts on the specific force. A gyro bias
+ε makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
 
-The same ψ acts through the specific force and through the arm, so the row of an error of an inertial sensor includes
+The same ψ acts through the specific force and through the arm, so the row for an error of an inertial sensor includes
 both effects. A further row shows the effect of attitude through the arm alone; it is part of no sum. Derived here.
 """
 
@@ -51,23 +51,23 @@ _UNIFORM_SIGMA_RATIO = 12**-0.5  # ratio of sigma to step for an error that is u
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InertialFigure:
-    """A figure of an inertial sensor, such as the bias of its gyros.
+    """A declared error of an inertial sensor, such as the bias of its gyros.
 
     Attributes
     ----------
     name : str
-        Key of the figure in the file, and the axis of its row.
+        Key of the error in the file, and the axis of its row.
     unit : str
-        Unit of the figure in SI.
+        Unit of the error in SI.
     integrals : int
-        Number of integrations over time from the figure to the position error. A constant figure that is integrated
-        n times becomes τⁿ/n!.
+        Number of integrations over time from the error to the position error. A constant error that is integrated n
+        times becomes τⁿ/n!.
     spreads : bool
-        Whether the figure is noise, which spreads power. Any other figure is a constant random error.
+        Whether the error is noise, which spreads power. Otherwise it is a random constant.
     tilts : bool
-        Whether the figure tilts the axes of the sensor. A tilt rotates the specific force, and the lever arm.
+        Whether the error tilts the axes of the sensor. A tilt rotates the specific force, and the lever arm.
     is_scale : bool
-        Whether the figure is a fraction of the specific force.
+        Whether the error is a fraction of the specific force.
     """
 
     name: str
@@ -79,7 +79,7 @@ class InertialFigure:
 
     @property
     def growth_power(self) -> int:
-        """Power of the aperture time with which the covariance of the position error grows."""
+        """Exponent of the aperture time to which the covariance of the position error is proportional."""
         return 2 * self.integrals - self.spreads
 
 
@@ -99,17 +99,20 @@ INERTIAL_FIGURES: Mapping[str, InertialFigure] = {
 
 # ---------------------------------------------------------------------- correlated noise of a position
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
-    """Gauss–Markov process of an error that is correlated noise of a position, along `process_axes`."""
+    """Gauss–Markov process of an error that is correlated position noise, along the axes of `process_axes`."""
     return _PROCESSES[error.kind.name](mission, error)[0]
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) along which a process moves each platform, as a mapping from the platform's name."""
+    """Axes (3, 3) along which a process of position noise moves each platform, by the platform's name."""
     return _PROCESSES[error.kind.name](mission, error)[1]
 
 
 def _declared_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
-    """Process that the file declares for a platform or for both platforms, and its axes on each platform."""
+    """Process that the file declares for a platform or for both platforms, and its axes on each platform.
+
+    The axes are (3, 3) for each name of a platform.
+    """
     motion: MotionError | CommonMotionError | None = mission.common_motion_error
     names: tuple[str, ...] = PLATFORMS
     if error.owner in PLATFORMS:
@@ -120,7 +123,10 @@ def _declared_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov
 
 
 def _log_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
-    """Noise, and its axes, of a log whose fixes the processor uses without smoothing, for one case."""
+    """Process for the noise of a log, and its axes by the platform's name, for a single case.
+
+    The processor must use the fixes of the log without smoothing.
+    """
     path: FlownPath | None = getattr(mission.platforms, error.owner).path
     assert path is not None
     assert path.log_noise is not None
@@ -155,9 +161,9 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
 def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> Floats:
     """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
 
-    `axes` has the same shape. `force` (3, ...) is the specific force. [m/s²] A tilt about an axis rotates the
-    specific force. A scale factor adds a fraction of its component along the axis. Any other sensor error is an
-    acceleration along the axis.
+    `axes` are the vectors of the axes, with the same shape. `force` (3, ...) is the specific force. [m/s²] A tilt
+    about an axis rotates the specific force. A scale factor error adds a fraction of the component of the specific
+    force along the axis. Any other sensor error is an acceleration along the axis.
     """
     if figure.tilts:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
@@ -167,7 +173,7 @@ def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> 
 
 
 def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the errors of a platform's inertial sensor, declared or not; nothing without a sensor."""
+    """Yield the errors of a platform's inertial sensor, declared or not; no errors if the platform has no sensor."""
     error = seen.error(name)
     if error.imu is None:
         return
@@ -211,8 +217,9 @@ def _moves_by_imu(
 ) -> tuple[Moves, ...]:
     """Motion of a platform per unit of a sensor error, due to the acceleration error and to the lever arm.
 
-    `directions` (axes, 3, cases) is the acceleration error per unit. [m/s²/unit] `about` (axes, 3, cases) are the
-    axes of the sensor error. `arm` (3, nodes, cases) is the lever arm [m]; None without an arm.
+    `directions` (axes, 3, cases) is the acceleration error per unit about or along each axis. [m/s²/unit] `about`
+    (axes, 3, cases) are the axes of the sensor error. `arm` (3, nodes, cases) is the lever arm [m]; None if the file
+    states no arm.
     """
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or not figure.tilts:
@@ -236,18 +243,17 @@ _inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.in
 def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
     """Quadratic, cubic and remaining phase due to one unit of a sensor error, in the published model. [rad/unit]
 
-    `index` is the position of the kind of error in `IMU_KINDS`. `along` is the component of the acceleration error of
-    one unit along the line of sight at mid-aperture. [m/s²/unit]
+    `index` is the index of the sensor error in `INERTIAL_FIGURES`. `along` is the acceleration error per unit along
+    the line of sight at mid-aperture. [m/s²/unit]
     """
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     return _inertial_phases(along, along, along, wavelength, T)[index]
 
 
 def _moved_by_imu(seen: SensorCases, figure: InertialFigure, along: Floats) -> tuple[PerCase, PerCase]:
-    """Sigmas of the displacement per unit of a sensor error, in the published model. [m]
+    """Sigmas of the displacement, east and north, per unit of a sensor error, in the published model. [m/unit]
 
-    `along` is the component of the acceleration error of one unit along the line of sight at mid-aperture.
-    [m/s²/unit]
+    `along` is the acceleration error per unit along the line of sight at mid-aperture. [m/s²/unit]
     """
     fit = seen.exact.fit[:2]
     if figure.spreads:
@@ -262,7 +268,7 @@ def _moved_by_imu(seen: SensorCases, figure: InertialFigure, along: Floats) -> t
 def _over_aperture(
     seen: SensorCases, platform_index: int, figure: InertialFigure, directions: Floats
 ) -> RandomEffect:
-    """Effect of one unit of a figure of a sensor, in the full model along the exact paths.
+    """Effect of one unit of a sensor error in the full model, along the exact paths.
 
     `directions` (axes, 3, cases) is the acceleration error due to one unit on each axis. [m/s²/unit] The motion error
     is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
@@ -279,20 +285,21 @@ def _over_aperture(
 
 
 def _walk_of(figure: InertialFigure, count: int) -> "_Walks":
-    """Position error by the noise of a sensor, as integrals of white noise.
+    """Covariance of the position error that the noise of a sensor causes.
 
     The position error is an integral of white noise. The noise is a white acceleration, or a white tilt rate whose
-    tilt rotates the specific force.
+    tilt rotates the specific force. `count` is the number of nodes.
     """
     return _walks(figure.integrals - 1, figure.integrals - 1, count)
 
 
 @cache
 def _courses(figure: InertialFigure, count: int) -> Floats:
-    """Independent variations of the position by a unit acceleration, or by its noise, over 2 s, (courses, nodes).
+    """Independent components of the position error along an axis over an aperture of 2 s, (courses, nodes).
 
-    Noise has several independent components. Every other kind has one: the motion due to an acceleration of 1 m/s²,
-    or, for a gyro bias, due to an acceleration that grows by 1 m/s² per second. All are zero at mid-aperture.
+    For noise they are the components of the position error due to noise of unit density. Any other sensor error has a
+    single component. It is the motion due to an acceleration of 1 m/s², or, for a gyro bias, due to an acceleration
+    that grows by 1 m/s² per second. All components are zero at mid-aperture.
     """
     if figure.spreads:
         return factor(_walk_of(figure, count).at_nodes).T
@@ -303,7 +310,7 @@ def _courses(figure: InertialFigure, count: int) -> Floats:
 def body_axes(state: PlatformState, times: Floats) -> Floats:
     """Body axes of a platform at slow times [s], as unit vectors in the axes of the scene, (axes, 3, *times.shape).
 
-    They are along, cross and up of the velocity. For a platform at rest they are the axes of the scene.
+    The axes are along, cross and up of the velocity. For a platform at rest they are the axes of the scene.
     """
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     if np.any(state.is_still):
@@ -315,7 +322,10 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
 
 
 def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
-    """Lever arm at slow times [s] in the axes of the scene, (3, *times.shape). [m]"""
+    """Lever arm at slow times [s] in the axes of the scene, (3, *times.shape). [m]
+
+    `arm` has the components of the lever arm along the body axes. [m]
+    """
     return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
 
 
@@ -329,7 +339,7 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the errors of a platform's lever arm.
+    """Yield the errors of a platform's lever arm; no errors if the file states no lever arm.
 
     They are the effect of attitude errors through the arm, declared or not, and the declared uncertainty of the arm.
     """
@@ -364,7 +374,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _with_arm(
     seen: SensorCases, platform_index: int, figure: InertialFigure, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects, in both models, of one unit of tilt, tilt rate or tilt noise of a platform with a lever arm.
+    """Effects of one unit of tilt, tilt rate or tilt noise on a platform with a lever arm: published and full model.
 
     The tilt is about the axes `about`, (axes, 3, cases). `directions` (axes, 3, cases) is the acceleration error due
     to the tilt of the specific force. [m/s²/unit] `arm` (3, nodes, cases) is the lever arm at the nodes. [m]
@@ -406,8 +416,8 @@ class _Walks(NamedTuple):
 
     Both integrals start at mid-aperture and run forward and backward in time. `at_nodes` (nodes, nodes) is the
     covariance of the first integral with the second at the nodes, in the Legendre orders that the nodes can
-    distinguish. `left` is the mean over the aperture of the expected product of both, without their orders 0 to 3.
-    `beyond` is the same mean without all orders that the nodes can distinguish.
+    distinguish. `left` is the mean, over the aperture, of the expected product of both integrals without their
+    Legendre orders 0 to 3. `beyond` is the same mean without all orders that the nodes can distinguish.
     """
 
     at_nodes: Floats
@@ -419,14 +429,17 @@ class _Walks(NamedTuple):
 def _walks(first: int, second: int, count: int) -> _Walks:
     """Covariance of white noise integrated `first` + 1 times with the same noise integrated `second` + 1 times.
 
-    `count` is the number of nodes. Noise integrated once (0) is a random walk.
+    `count` is the number of nodes. The value 0 for `first` or `second` means a random walk: noise integrated once.
     """
     gauss_nodes, weights = np.polynomial.legendre.leggauss(2 * count)
     start, weight = (1 + gauss_nodes) / 2, weights / 2  # on one side of the middle
     number = np.arange(count)
 
     def order_of(times: int) -> Floats:
-        """Legendre coefficients of a unit impulse at each start time, integrated `times` + 1 times, (n, starts)."""
+        """Legendre coefficients of unit impulses that are integrated `times` + 1 times, (count, starts).
+
+        Each column belongs to the start time of an impulse.
+        """
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
         return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead, count), grown))
@@ -444,8 +457,8 @@ def _walks(first: int, second: int, count: int) -> _Walks:
 def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
     """Independent components of a tilt that is a random walk, and of its double integral, over an aperture of 2 s.
 
-    Returns the components of the double integral and those of the tilt at the nodes, each (courses, nodes). Row i of
-    both follows from the same noise.
+    Returns two arrays (courses, nodes): the components of the double integral, and the components of the tilt. Row i
+    of both arrays follows from the same noise.
     """
     both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)
@@ -458,7 +471,7 @@ def _legendre(abscissas: Floats, count: int) -> Floats:
 
 # ---------------------------------------------------------------------- position noise
 def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield an error for each process of correlated noise of a platform's position."""
+    """Yield an error for each process of correlated noise that the file states for a platform's position."""
     error = seen.error(name)
     key = error.key_of("random")
     for index, process in enumerate(error.random):
@@ -467,23 +480,24 @@ def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def residual_subject(name: str) -> Subject:
-    """Subject of the residual of a platform's log about the smooth path."""
+    """Subject of the error due to the residuals of a platform's log about the smooth path."""
     return subject(name, "trajectory", "residual")
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the noise of a platform's log if the processor uses its fixes without smoothing; nothing for other paths.
+    """Yield the noise of a platform's log if the processor uses its fixes without smoothing; otherwise no errors.
 
-    The residual of the fixes about the smooth path is represented by a Gauss–Markov process with the covariance and
+    A Gauss–Markov process represents the residual of the fixes about the smooth path. It has the covariance and the
     correlation time of the residual. White fixes joined by straight lines are correlated over half an interval. Like
-    any noise, the process displaces and defocuses the image by its low orders, and spreads power by its higher ones.
+    any noise, the process displaces and defocuses the image by its low orders, and spreads power by its higher
+    orders.
 
     The fixes are rounded to a grid with the step q. The rounding error is uniformly distributed over a step and has
     the variance q²/12 along each coordinate. If the platform crosses many steps within the aperture, the rounding
     differs from fix to fix. It is then part of the residual, and hardly displaces the image. If the platform crosses
-    no step, the rounding is one constant error over the aperture, which the residual does not contain. The log does
-    not show which of the two applies, and any fraction of the variance may be constant. The whole variance is
-    therefore treated as constant, in addition to the residual.
+    no step, the rounding is a constant error over the aperture, which the residual does not contain. The log does not
+    show which of the two applies, and any fraction of the variance may be constant. The whole variance is therefore
+    treated as constant, in addition to the residual.
     """
     path: FlownPath | None = getattr(seen.mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -496,7 +510,7 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
-    """Sigmas, axes and correlation time of the two kinds of noise of a log, by name.
+    """Sigmas, axes and correlation time of the noise of a log, for its two parts `residual` and `grid`.
 
     `residual` is the noise of the fixes, and `grid` their rounding to a grid. Each has sigmas (3, cases) [m], axes
     (3, 3, cases) and a correlation time [s].
@@ -523,7 +537,8 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Per
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
     """Yield an error for each process of correlated noise that both platforms share.
 
-    The effects of an axis of the frame on both legs add with their signs. Different axes are independent.
+    The noise along an axis of the frame moves both platforms, and its effects on both legs add with their signs.
+    Noise along different axes is independent.
     """
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
@@ -532,9 +547,9 @@ def common_noise(seen: SensorCases) -> Iterator[RandomError]:
 
 
 class _Process(NamedTuple):
-    """A Gauss–Markov process: its subject, sigmas along three axes [m] and correlation time [s].
+    """A Gauss–Markov process that moves platforms: its subject, sigmas along three axes [m] and correlation time [s].
 
-    Numbers may be arrays (cases,). `spreads` tells whether part of the process spreads power.
+    Numbers may be arrays (cases,). `spreads` is true if part of the process spreads power.
     """
 
     subject: Subject

@@ -41,7 +41,7 @@ _EXCHANGE_START_COUNT = 8  # start times of the exchanges, over which the effect
 class Felt(NamedTuple):
     """Vibration that acts on an oscillator, and the oscillator's acceleration sensitivity. [s²/m]
 
-    `is_own` is true if the vibration is stated for the oscillator, and false if it is stated for the platform.
+    `is_own` is true if the file states the vibration for the oscillator, and false if it states it for the platform.
     """
 
     vibration: Vibration | FeltVibration
@@ -50,7 +50,7 @@ class Felt(NamedTuple):
 
 
 def felt(mission: Mission, name: str) -> Felt | None:
-    """Vibration that acts on a platform's oscillator; None if the file states no sensitivity."""
+    """Vibration and acceleration sensitivity of a platform's oscillator; None if the file states no sensitivity."""
     platform = getattr(mission.platforms, name)
     oscillator: Oscillator | None = platform.oscillator
     if oscillator is None or oscillator.acceleration_sensitivity is None:
@@ -61,10 +61,10 @@ def felt(mission: Mission, name: str) -> Felt | None:
 
 
 def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
-    """Cases in which a wideband vibration without a spectrum acts on an oscillator.
+    """Mark the cases in which a wideband vibration without a spectrum affects the data through an oscillator.
 
-    The rms phase of the oscillator, f₀·Γ·4π²·f·σ for an rms displacement σ, cannot be computed, because the frequency
-    f is unknown.
+    The rms phase of the oscillator is f₀·Γ·4π²·f·σ for an rms displacement σ at the frequency f. It cannot be
+    computed, because f is unknown.
     """
     felt_vibration = felt(mission, name)
     if (
@@ -80,7 +80,7 @@ def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
 def is_unshaken(mission: Mission, name: str) -> bool:
     """Whether an oscillator is sensitive to acceleration, but the file states no vibration or turn that acts on it.
 
-    False for the transmitter's oscillator with a direct path, because its phase drops out of the data.
+    With a direct path it is false for the transmitter's oscillator, whose phase drops out of the data.
     """
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
@@ -95,16 +95,17 @@ def is_unshaken(mission: Mission, name: str) -> bool:
 
 
 class AcceleratedTone(NamedTuple):
-    """Tone of an oscillator that a vibration causes.
+    """Tone in the phase of an oscillator that a sinusoidal vibration causes.
 
-    `name` is the platform and `entry` the index of the vibration. `frequency` is in Hz, and `acceleration` is the
-    amplitude of the acceleration. [m/s²] `free` is the peak phase of a free oscillator per unit of the sensitivity Γ.
-    [rad/(s²/m)] `left` is the tone that the synchronization leaves, and `echo` is the share of `left` that makes
-    echoes.
+    `name` is the platform, and `entry` the index of the vibration in the file. `frequency` is in Hz, and
+    `acceleration` is the amplitude of the acceleration. [m/s²] `free` is the peak phase without synchronization at
+    the radar's centre frequency, per unit of the sensitivity Γ. [rad/(s²/m)] `sensitivity` is Γ. [s²/m] `left` are
+    the tones that remain of a tone of amplitude 1 after synchronization, and `echo` is the amplitude with which they
+    make echoes.
 
     `in_quadrature` is the id of the row of the platform's vibration that causes the tone. The tone is a quarter cycle
-    out of phase with that vibration. It is None for a vibration along several axes, and for a vibration that the file
-    states for the oscillator alone.
+    out of phase with that vibration. `in_quadrature` is None for a vibration along several axes, and for a vibration
+    that the file states for the oscillator alone.
     """
 
     name: str
@@ -136,8 +137,8 @@ class AcceleratedTone(NamedTuple):
 def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
     """List the tones that sinusoidal vibrations cause in the oscillators of the platforms.
 
-    With a direct path as clock, only the receiver's tones count. They enter both the direct path and the echo.
-    `geometry` holds many cases if numbers of the mission are arrays.
+    With a direct path as clock, only the receiver's tones are listed. They enter both the direct path and the echo.
+    `geometry` is the geometry of all cases, if numbers of the mission are arrays; omitted: the mission's own.
     """
     tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -161,10 +162,11 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the error of an oscillator under acceleration; nothing if the file states no sensitivity.
+    """Yield the error of an oscillator under acceleration; no error if the file states no sensitivity.
 
     The error includes the effects of random vibration, of tones below one cycle per aperture, and of turns of the
-    platform. Faster tones have rows of their own. The declared size is the sensitivity Γ. [s²/m]
+    platform. Faster tones have rows of their own. The declared size is the sensitivity Γ, coverage factor included.
+    [s²/m]
     """
     felt_vibration = felt(seen.mission, name)
     if felt_vibration is None:
@@ -185,7 +187,7 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     """Mean squares of the parts of the range error that vibration causes, per squared unit of Γ. [m²/unit²]
 
-    They add the effects of the vibration spectrum and of slow tones, each tone in its worst phase.
+    They are sums over the vibration spectrum and the slow tones, each tone in its worst phase.
     """
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
@@ -203,9 +205,10 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
-    """Effects, in both models, of a path's acceleration on the oscillator, per unit of its sensitivity Γ.
+    """Effects of a path's acceleration on the oscillator per unit of Γ: in the published and in the full model.
 
-    None for a path without acceleration or in free fall, where no acceleration acts on the oscillator.
+    Γ is the acceleration sensitivity. The result is None for a path without acceleration and for a path in free fall,
+    where no acceleration acts on the oscillator.
     """
     state: PlatformState = getattr(seen.geometry, name)
     if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT_ACCELERATION_MPS2):
@@ -222,10 +225,10 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
     """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (3, moments, …). [s/(s²/m)]
 
-    `moments` are slow times. [s] With an `interval` of exchanges [s] the result is the remainder after
-    synchronization. The first exchange may be at any time within an interval, so the remainders for several start
-    times are returned, (3 · start times, moments, …). They are scaled so that the sum of their squares is the mean
-    square over the start times.
+    `moments` are slow times. [s] If the clocks exchange pulses at an `interval` [s], the result is the remainder
+    after synchronization. The first exchange may be at any time within an interval, so the remainders for several
+    start times are returned, (3 · start times, moments, …). They are scaled so that the sum of their squares is the
+    mean square over the start times.
     """
 
     def gained(tau: PerCase) -> Floats:
@@ -251,7 +254,7 @@ def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None
 def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
     """Whether a platform is in free fall, for one case or an array of cases.
 
-    The criterion is that the specific force is smaller than the acceleration of the path.
+    The criterion is that the magnitude of the specific force is smaller than the acceleration of the path.
     """
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
@@ -264,7 +267,7 @@ def flies_a_turn(mission: Mission, name: str) -> bool:
 
 
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
-    """Combined effect of two independent errors that have the same unit; their squares add."""
+    """Combined effect of two independent errors that have the same unit, as the root-sum-square of both effects."""
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
     covariance = None
     if first.covariance is not None and second.covariance is not None:

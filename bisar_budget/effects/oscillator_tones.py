@@ -1,10 +1,10 @@
-"""Tones of oscillators: spurs, and what remains of any tone after synchronization, as tones with frequencies.
+"""Tones in the phase of oscillators: spurs, and the tones that remain of any tone after synchronization.
 
-The exchanges of pulses, one every T_s, sample a tone at frequency f. Between the samples, the phase is interpolated
-linearly. The interpolated phase contains tones at f + m/T_s, whose amplitudes are sinc²((f + m/T_s)·T_s) of that of
-the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude remains at f (m = 0).
-The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded tones depend on the
-unknown instant of the exchange within its interval. Derived here.
+The exchanges of pulses, at intervals T_s, sample a tone at frequency f. Between the samples, the phase is
+interpolated linearly. The interpolated phase contains tones at f + m/T_s. Their amplitudes are sinc²((f + m/T_s)·T_s)
+times the amplitude of the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude
+remains at f (m = 0). The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded
+tones depend on the unknown instant of the exchange within its interval. Derived here.
 """
 
 import math
@@ -26,7 +26,7 @@ _NEIGHBOUR_RATE_COUNT = (
 
 
 class LeftTone(NamedTuple):
-    """The tones that remain of a tone of amplitude 1 after synchronization.
+    """Tones that remain of a tone of amplitude 1 after synchronization.
 
     `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
     are the amplitudes of the remaining tones; 0 for a frequency that does not occur.
@@ -37,11 +37,11 @@ class LeftTone(NamedTuple):
 
     @property
     def is_folded(self) -> bool:
-        """Whether exchanged pulses fold the tone."""
+        """Whether the synchronization exchanges pulses, which fold the tone to further frequencies."""
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: PerCase) -> list[PerCase]:
-        """Amplitudes of the remaining tones as far as they make echoes.
+        """Amplitudes with which the remaining tones make echoes.
 
         A folded tone below one cycle per aperture makes no echo, so its amplitude is 0. A tone that is not folded
         keeps its amplitude at any frequency.
@@ -54,9 +54,10 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> PerCase:
-        """Amplitude of the remaining tone that makes the largest echo.
+        """Amplitude with which the remaining tones make echoes.
 
-        Without a PSLR requirement the result is the root-sum-square of the amplitudes of all tones that make echoes.
+        With a PSLR requirement it is the amplitude of the tone that makes the largest echo. Without this requirement
+        it is the root-sum-square of the amplitudes of all tones that make echoes.
         """
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
@@ -66,9 +67,9 @@ class LeftTone(NamedTuple):
         return largest
 
     def slowest_echo(self, aperture_time: PerCase) -> PerCase:
-        """Lowest frequency of the remaining tones that make an echo and have more than 1 % of the amplitude. [Hz]
+        """Lowest frequency of the remaining tones that make echoes with more than 1 % of the original amplitude. [Hz]
 
-        For a tone that is not folded it is the tone's own frequency.
+        For a tone that is not folded it is the tone's own frequency. It is infinite if no tone makes such an echo.
         """
         if not self.is_folded:
             return self.frequencies[0]
@@ -86,9 +87,10 @@ class LeftTone(NamedTuple):
         return of_largest
 
     def slow_parts(self, aperture_time: PerCase) -> Parts:
-        """Squares of the parts over the aperture of all tones below one cycle per aperture, in worst phases. [rad²]
+        """Squares of the parts, over the aperture, of the sum of all tones below one cycle per aperture. [rad²]
 
-        The tones that remain of one tone are not independent, so the amplitudes of their parts add.
+        Each tone is taken in its worst phase. The remaining tones are not independent, so the amplitudes of their
+        parts add.
         """
         total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
@@ -104,10 +106,10 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """Tones that remain of a tone of amplitude 1 at a frequency [Hz] after synchronization.
+    """Tones that remain of a tone of amplitude 1 at a given frequency [Hz] after synchronization.
 
     With a direct path, the receiver's tone remains with the amplitude 2|sin(πfΔt)|, where Δt is the delay of the echo
-    after the direct path.
+    after the direct path. Without a direct path or an exchange of pulses the tone remains unchanged.
     """
     sync = mission.synchronization
     if mission.has_direct_path:
@@ -126,10 +128,10 @@ def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometr
 
 
 class Spur(NamedTuple):
-    """Spur of an oscillator: platform, index of its entry in the file, and frequency [Hz].
+    """Spur of an oscillator: name of the platform, index of the spur in the file, and frequency [Hz].
 
     `free` is the peak phase at the radar's centre frequency without synchronization. [rad] `left` are the tones that
-    remain of a tone of amplitude 1 after synchronization. `echo` is the amplitude of those that make echoes.
+    remain of a tone of amplitude 1 after synchronization. `echo` is the amplitude with which they make echoes.
     """
 
     name: str
@@ -146,11 +148,11 @@ class Spur(NamedTuple):
 
     @property
     def phase(self) -> PerCase:
-        """Peak phase of the spur's echo. [rad]"""
+        """Peak phase of the spur's echo at the radar's centre frequency. [rad]"""
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: PerCase) -> Parts | None:
-        """Squares of the parts over the aperture of the folded tones below one cycle per aperture. [rad²]
+        """Squares of the parts, over the aperture, of the spur's tones below one cycle per aperture. [rad²]
 
         None if the synchronization does not fold the spur.
         """
@@ -162,8 +164,8 @@ class Spur(NamedTuple):
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
     """List the spurs of oscillators that reach the image.
 
-    With a direct path as clock, these are the receiver's spurs only. They enter both the direct path and the echo.
-    `geometry` holds many cases if numbers of the mission are arrays.
+    With a direct path as clock, only the receiver's spurs are listed. They enter both the direct path and the echo.
+    `geometry` is the geometry of all cases, if numbers of the mission are arrays; omitted: the mission's own.
     """
     spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:

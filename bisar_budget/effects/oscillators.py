@@ -1,7 +1,7 @@
-"""Oscillators: phase noise stated by a mask, an Allan deviation or a power law, and random errors of clocks.
+"""Oscillators: phase noise stated as a mask, an Allan deviation or a power law, and the random errors it causes.
 
-Spectra are one-sided. A synchronization link removes a part of the noise and adds noise of its own, depending on how
-the clocks are synchronized.
+All spectra are one-sided. Synchronization of the clocks removes a part of the noise. The method of synchronization
+determines which part remains. The synchronization link adds noise of its own.
 """
 
 import math
@@ -35,7 +35,10 @@ COVERED_CYCLES = 0.1  # cycles per aperture down to which a mask should reach; s
 
 
 class Noise(NamedTuple):
-    """Phase noise of an oscillator at the radar's centre frequency, and the assumptions behind it."""
+    """Phase-noise spectrum of an oscillator at the radar's centre frequency, with notes on the assumptions behind it.
+
+    `pieces` are the power-law pieces of the one-sided spectrum.
+    """
 
     pieces: tuple[PowerLawPiece, ...]
     notes: tuple[Note, ...] = ()
@@ -44,9 +47,10 @@ class Noise(NamedTuple):
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """One-sided phase spectrum of an oscillator at a centre frequency [Hz], scaled by its level. [rad²/Hz]
+    """Phase-noise spectrum of an oscillator at a given centre frequency, one-sided. [rad²/Hz]
 
-    A power law that is fitted to an Allan deviation depends on the aperture time. [s]
+    `center_frequency` is in Hz, and `aperture_time` in s. The `level` of the oscillator in dB scales the spectrum. A
+    power law that is fitted to an Allan deviation may depend on the aperture time, see `fitted`.
     """
     center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as the square of the frequency
     if oscillator.phase_noise is not None:
@@ -69,7 +73,10 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 
 
 def noise_in_case(mission: Mission, name: str) -> Noise:
-    """One-sided phase spectrum of a platform's oscillator in the mission of one case. [rad²/Hz]"""
+    """Phase-noise spectrum of a platform's oscillator at the radar's centre frequency, one-sided. [rad²/Hz]
+
+    `mission` is the mission of a single case, so its numbers are not arrays. `name` is the name of the platform.
+    """
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     return noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
 
@@ -101,7 +108,11 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 
 
 def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[PowerLawPiece, ...]:
-    """Phase spectrum of a power law of fractional frequency, S_φ = f₀²·S_y/f². [rad²/Hz]"""
+    """Convert a power law S_y of fractional frequency to the phase spectrum S_φ = f₀²·S_y/f². [rad²/Hz]
+
+    f₀ is the centre frequency. [Hz] The spectrum extends from 0 Hz to `bandwidth`. [Hz] The result has a piece for
+    each nonzero coefficient of the power law.
+    """
     square = center_frequency**2
     return tuple(
         PowerLawPiece(0.0, bandwidth, square * h, slope)
@@ -111,9 +122,9 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variances at the averaging time `tau` [s] for unit values of h₋₂, h₋₁, h₀, h₁ and h₂, (5,).
+    """Allan variance that each power-law coefficient h₋₂, h₋₁, h₀, h₁ and h₂ causes if its value is 1, (5,).
 
-    `bandwidth` is the bandwidth of the measurement. [Hz]
+    `tau` is the averaging time. [s] `bandwidth` is the bandwidth of the measurement. [Hz]
     """
     return (
         2 * math.pi**2 / 3 * tau,
@@ -125,18 +136,19 @@ def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
 
 
 class Fit(NamedTuple):
-    """Power law fitted to an Allan deviation, and its largest misfit as a fraction of the deviation."""
+    """Power law fitted to an Allan deviation, and its largest misfit as a fraction of the stated deviation."""
 
     misfit: float
     law: PowerLaw
 
 
 def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
-    """Fit the coefficients h₋₂ … h₁ of a power law, none negative, to an Allan deviation.
+    """Fit a power law with non-negative coefficients h₋₂ … h₁ to an Allan deviation.
 
     `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz, and `aperture_time` in s. The
-    fit is a least-squares fit of relative variances, with as few terms as describe the points. Among sets of terms
-    that describe the points equally well, the set with the largest quadratic phase over the aperture is used.
+    fit minimises the squares of the relative errors of the Allan variances. It uses as few terms as describe the
+    points. Several sets of terms may describe the points almost equally well. The fit then uses the set with the
+    largest quadratic phase over the aperture.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
@@ -154,7 +166,11 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 
 @lru_cache(maxsize=64)
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
-    """Fits of all sets of terms that have only positive coefficients, as one tuple for each number of terms."""
+    """Fit each set of power-law terms to an Allan deviation, and keep the fits with only positive coefficients.
+
+    `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz. The fits with the same number
+    of terms form one tuple. A number of terms without any such fit has no tuple.
+    """
     # White and flicker phase noise have nearly the same Allan variance: the fifth term is left out.
     term_count = 4
     variances = np.array([allan_variances(tau, bandwidth)[:term_count] for tau, _ in points])
@@ -169,12 +185,14 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
 
 
 def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None:
-    """Coefficients of the given terms in the least-squares fit of the relative variances to 1.
+    """Coefficients of a power law whose relative Allan variances are closest to 1 in the least-squares sense.
 
-    `relative` (points, terms) are the variances due to unit coefficients of all terms, divided by the stated
-    variances. `terms` are the indices of the terms of the fit. The result has the coefficients of all terms, 0 for
-    those outside the fit. None if a coefficient is not positive or not unique, or if a variance is not positive, as
-    may happen for a narrow band.
+    `relative` (points, terms) are the Allan variances due to a unit coefficient of each term, divided by the stated
+    variances. `terms` are the indices of the terms that the fit uses. The result has the coefficients of all terms. A
+    term that the fit does not use has the coefficient 0.
+
+    The result is None if a coefficient is not positive or not unique. It is also None if a variance in `relative` is
+    not positive, which may happen for a narrow band.
     """
     columns = relative[:, terms]
     if (columns <= 0).any():
@@ -190,13 +208,17 @@ def _least_squares(relative: Floats, terms: Sequence[int]) -> list[float] | None
 
 
 def _misfit(relative: Floats, law: Sequence[float]) -> float:
-    """Largest misfit of the Allan deviations of a power law, as a fraction of the stated deviations."""
+    """Largest relative difference between the Allan deviations of a power law and the stated deviations.
+
+    `relative` is described in `_least_squares`. `law` are the coefficients of the power law. A difference that is
+    only rounding error is set to 1e-6.
+    """
     return max(float(np.abs(np.sqrt(relative @ law) - 1).max()), _EXACT_FIT_FRACTION)
 
 
 # ---------------------------------------------------------------------- errors of clocks
 def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
-    """Platforms whose clocks run free after they were set, but whose oscillators the file does not state.
+    """Names of platforms whose clocks run free after they were set, but whose oscillators the file does not state.
 
     The random drift of such a clock is unknown, so its contribution is missing from the location budget.
     """
@@ -209,8 +231,8 @@ def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield the random error of a platform's oscillator; nothing if the file states no oscillator.
 
-    It consists of phase noise and of spurs that synchronization folds below one cycle per aperture. Only the noise
-    that remains in the data after the synchronization of the clocks is included.
+    The error consists of phase noise, and of spurs that synchronization folds below one cycle per aperture. It
+    includes only the noise that remains in the data after the synchronization of the clocks.
     """
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
@@ -237,7 +259,12 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
-    """Effect, in the full model, of the assumed noise below the first point of a mask; None if it is negligible."""
+    """Effect of the noise that is assumed below the first point of a mask; None if it is negligible.
+
+    The effect is computed by the full model and includes the coverage factor. `scale` is the square of the centre
+    frequency in Hz, multiplied by the level of the oscillator. The result is also None for an oscillator that is not
+    stated by a mask.
+    """
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
         return None
@@ -247,9 +274,10 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerC
 
 
 def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
-    """Cases in which the spectrum used differs from the stated one.
+    """Mark the cases in which the spectrum used for an oscillator may differ from its actual spectrum, (cases,).
 
-    The mask may be stated at another frequency, or the power law may fit the Allan deviation poorly.
+    A case is marked if the power law fits the Allan deviation poorly. All cases are marked if the file replaces the
+    mask of a part by a mask without a frequency, which is then taken at the frequency of the part.
     """
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
@@ -261,17 +289,23 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
 
 
 def states_both_terms(mission: Mission) -> bool:
-    """Whether the file states the constant and the linear clock term, which replace those of free oscillators."""
+    """Whether the file states both the constant and the linear term of the clock error.
+
+    These terms then replace the constant and the linear phase of free oscillators. With a direct path the result is
+    False.
+    """
     timing = mission.timing_error
     return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
 
 
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
-    """Effects, in both models, of a clock phase with the given parts of its noise and its slow tones. [rad²]
+    """Effects of a clock's phase error in the published and in the full model.
 
-    Orders 0 and 1 are included where they are known. If the file states the constant and the linear term of the
-    clock, these terms replace orders 0 and 1 of the `noise`, but not those of the slow `tones`. If the line of sight
-    turns, orders 2 and 3 also displace the image, which reduces the defocus they cause.
+    `noise` and `tones` are the mean squares of the parts of its noise and of its slow tones over the aperture. [rad²]
+    Orders 0 and 1 of the noise are included if they are finite. If they are not, the displacement is unknown and is
+    NaN. It is 0 if orders 2 and 3 are 0 as well. If the file states the constant and the linear term of the clock,
+    these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the slow tones are then still included. If the
+    line of sight turns, orders 2 and 3 also displace the image, which reduces the defocus that they cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -292,15 +326,15 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
-    """Parts of an oscillator's phase after synchronization, for a centre frequency of 1 Hz, (parts, cases). [rad²]
+    """Mean squares of the parts of the oscillator phase that remains after synchronization, (parts, cases). [rad²]
 
-    For a centre frequency f₀ they are f₀² times as large. They are the parts of the whole spectrum or, with
-    `is_below_mask`, of the spectrum below the first point of a mask.
+    They hold for a centre frequency of 1 Hz. For a centre frequency of f₀ Hz they are f₀² times as large. The parts
+    are the fields of `Parts`. With `is_below_mask`, only the spectrum below the first point of the mask is included.
 
-    The parts depend on how the clocks are synchronized. For free clocks, all of the noise remains. If the clocks
-    exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the noise
-    since the setting remains. If the receiver uses the direct path, the change of the receiver's noise between direct
-    path and echo remains, and nothing of the transmitter's.
+    The remaining phase depends on how the clocks are synchronized. For free clocks, all of the noise remains. If the
+    clocks exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the
+    noise since the setting remains. If the receiver uses the direct path, the change of the receiver's noise between
+    the arrivals of direct signal and echo remains, and no noise of the transmitter.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
     remaining = np.zeros((len(Parts._fields), seen.cases))
@@ -320,9 +354,11 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 def _left_of(
     pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
-    """Parts of a phase spectrum after synchronization, each (len(cases_of_spectrum),). [rad²]
+    """Mean squares of the parts of the phase that remains after synchronization, from a phase spectrum. [rad²]
 
-    `interval` is the interval of exchanged pulses [s]; None without exchanges.
+    `pieces` are the pieces of the spectrum. `interval` is the interval of exchanged pulses [s]; None without
+    exchanges. `cases_of_spectrum` are the indices of the cases that have the spectrum. Each field of the result has
+    the shape (len(cases_of_spectrum),).
     """
     sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:
@@ -338,9 +374,10 @@ def _left_of(
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
-    """Yield the random error of the synchronization exchanges; nothing if the file states none.
+    """Yield the random phase error of the synchronization link; nothing if the file states no error of the link.
 
-    Each exchange has an independent error. Between exchanges, the error is interpolated linearly.
+    Each exchange of pulses has an independent error. Between exchanges, the error is interpolated linearly. If the
+    file states no interval of exchanges, the error is independent from pulse to pulse, and all of it spreads power.
     """
     sync = seen.mission.synchronization
     if sync is None or sync.error is None:

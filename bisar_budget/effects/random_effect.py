@@ -1,11 +1,11 @@
 """Effects of random errors on the image, for one unit (1 sigma) of each error in each case.
 
-A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹; orders
-2 and higher defocus it. The published model uses the line of sight at mid-aperture (`theory.random_errors`) and the
-matrix Q of (25). The full model includes the turn of the line of sight, a direct path, and the phase that the
-displacement adds.
+A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹. Orders
+2 and higher defocus the image. The published model uses the line of sight at mid-aperture (`theory.random_errors`)
+and the matrix Q of (25). The full model includes the turn of the line of sight, a direct path from transmitter to
+receiver, and the phase that the displacement adds.
 
-Numbers of a mission may be arrays (cases,). The geometry then has the same cases.
+The numbers in a mission may be arrays (cases,). The geometry then has the same cases.
 """
 
 import math
@@ -51,17 +51,19 @@ Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
 
 
 class RandomEffect(NamedTuple):
-    """Effect of one unit of a random error, as one sigma: phases, displacement, and their covariance.
+    """Effect of one unit of a random error on the image: sigmas of phases and displacement, and their covariance.
 
     `quadratic` and `cubic` are the phases at the aperture edge. [rad/unit] `spread` is the rms phase beyond the
-    cubic. [rad/unit] It stands for a mean power, so it never includes the coverage factor. `east` and `north` are the
+    cubic. [rad/unit] It represents a mean power, so it never includes the coverage factor. `east` and `north` are the
     sigmas of the displacement. [m/unit] They are NaN if the displacement is unknown, as for a free oscillator.
 
     `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
-    the products of their units. It is None in the published model, which has only the sigmas. `hidden` is the
-    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve, see
-    `ranges.exact_ranges`. [rad/unit] `rest` is the rms phase beyond the cubic of an error that is not noise, such as
-    a bias, at one sigma. It spreads power like the phase beyond the cubic of any motion error. [rad/unit]
+    the products of their units. It is None in the published model, which has only the sigmas. `hidden` is the hidden
+    phase: the quadratic phase that lowers the peak as much as the range error that the displacement cannot remove,
+    mainly a constant and a linear part. [rad/unit] Autofocus cannot correct it, see `ranges.exact_ranges`.
+
+    `rest` is the rms phase beyond the cubic of an error that is not noise, such as a bias. [rad/unit] It is the value
+    at one sigma, without the coverage factor. It spreads power like the phase beyond the cubic of any motion error.
     """
 
     quadratic: Any
@@ -74,18 +76,21 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase for the comparison with a limit that includes autofocus gain, see `Declared.judged`. [rad/unit]"""
+        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad/unit]"""
         phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
         return phase
 
     @property
     def displacement(self) -> PerCase:
-        """Rms length of the displacement. [m/unit]"""
+        """Rms length of the displacement; NaN if the displacement is unknown. [m/unit]"""
         length: PerCase = np.hypot(self.east, self.north)
         return length
 
     def of(self, case: int) -> "RandomEffect":
-        """Return the effect of one case in plain numbers, with a covariance (4, 4)."""
+        """Return the effect in one case in plain numbers.
+
+        `case` is the index of the case. The covariance is (4, 4), or None if the effect has no covariance.
+        """
         covariance = self.covariance
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
@@ -94,7 +99,10 @@ class RandomEffect(NamedTuple):
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
     def times(self, factor: PerCase) -> "RandomEffect":
-        """Multiply phases and displacement by a coverage factor. `spread` and `rest` stay as they are."""
+        """Multiply the phases and the displacement by a coverage factor, and the covariance by its square.
+
+        `spread` and `rest` do not change.
+        """
         return RandomEffect(
             self.quadratic * factor,
             self.cubic * factor,
@@ -110,10 +118,13 @@ class RandomEffect(NamedTuple):
 class Moves(NamedTuple):
     """Motion of a platform due to one unit (1 sigma) of a random error.
 
-    The motion is the sum of products of a direction from `ways`, a variation over the aperture from `courses`, and an
-    independent random number of variance 1 for each pair of both. `place` is the index of the platform. `ways` are
-    (ways, 3, nodes or 1, cases). [m/unit] `courses` are (courses, nodes, cases or 1), at the nodes of
-    `SensorCases.exact`. If an error has several `Moves`, the same pair of indices has the same random number in each.
+    `place` is the index of the platform. `ways` (ways, 3, nodes or 1, cases) are vectors along which the platform
+    moves. [m/unit] `courses` (courses, nodes, cases or 1) are variations over the aperture, at the nodes of
+    `SensorCases.exact`.
+
+    Each pair of a vector from `ways` and a variation from `courses` has an independent random number of variance 1.
+    The motion is the sum over all pairs of random number times vector times variation. If an error has several
+    `Moves`, the same pair of indices has the same random number in each.
     """
 
     place: int
@@ -122,19 +133,20 @@ class Moves(NamedTuple):
 
 
 class RandomError(NamedTuple):
-    """One error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
+    """Random error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
 
-    `declared` is the largest size of all axes, coverage factor included. The sizes of all axes are proportional to
-    it. It is None if the file declares no size. The unit of an oscillator is `dB`, and its noise is declared as an
-    amplitude factor of 1. `noise` is the spectrum of an oscillator, for a single case only. `noise_in_case` computes
-    it from the mission of one case and the name of the platform. `spreads` is true for noise, and false for an error
-    whose variation over the aperture has only a few orders.
+    `declared` is the declared size, coverage factor included; None if the file declares no size. For an error along
+    several axes it is the largest size of all axes, and the sizes of all axes are proportional to it. The unit of an
+    oscillator's error is `dB`, and its noise is declared as an amplitude factor of 1. `noise` is the spectrum of an
+    oscillator; it is None for many cases and for other errors. `noise_in_case` computes the spectrum from the mission
+    of one case and the name of the platform. `spreads` is true for noise, and false for an error whose variation over
+    the aperture has only a few orders.
 
-    `counted_in` is the id of another row that already includes this effect; this error then enters no other sum.
-    `moves` is the motion of platforms by one unit, used for the edge of a scene. It is empty for clocks and the air.
-    `continued` is the effect of the assumed spectrum below the first point of an oscillator's mask, if the mask does
-    not reach far enough down. `is_in_doubt` marks the cases in which the spectrum used for an oscillator differs from
-    the spectrum that the file states.
+    `counted_in` is the id of another row that already includes the effect of this error. This error is then left out
+    of sums. `moves` is the motion of platforms due to one unit, used for the edge of a scene. It is empty for clocks
+    and the air. `continued` is the effect of the spectrum that is assumed below the first point of an oscillator's
+    mask. It is None if the mask begins at a sufficiently low frequency. `is_in_doubt` marks the cases in which the
+    spectrum used for an oscillator may differ from its actual spectrum.
     """
 
     subject: Subject
@@ -163,7 +175,7 @@ class RandomError(NamedTuple):
 
     @property
     def kind(self) -> SourceKind:
-        """The kind of the error, with all that is known about it."""
+        """Kind of the error, which holds the properties that all errors of the kind share."""
         return self.subject.source_kind
 
     @property
@@ -180,12 +192,15 @@ class RandomError(NamedTuple):
 
     @property
     def extrapolated(self) -> Note:
-        """Note on how the noise of an oscillator continues beyond the stated points."""
+        """Note on how an oscillator's noise continues beyond the stated points; empty if `noise` is None."""
         return NOTHING if self.noise is None else self.noise.extrapolated
 
     @property
     def displaces_unknown(self) -> PerCaseFlag:
-        """Cases in which the error causes a displacement that the file does not determine."""
+        """Mark the cases in which the declared error displaces the image by an unknown amount.
+
+        The result is False if the file declares no size.
+        """
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
     def effect(self, model: str) -> RandomEffect:
@@ -194,7 +209,10 @@ class RandomError(NamedTuple):
 
 
 class SensorCases:
-    """Geometry and exact ranges of many cases, for the errors of sensors and clocks. Arrays are (…, cases)."""
+    """Geometry and exact ranges of many cases, from which the effects of random errors are computed.
+
+    The last axis of each array has the cases.
+    """
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
         self.mission, self.geometry, self.cases = mission, geometry, cases
@@ -215,38 +233,42 @@ class SensorCases:
         return numbers
 
     def error(self, name: str) -> MotionError:
-        """Declared motion error of a platform."""
+        """Declared motion error of the platform `name`."""
         motion_error: MotionError = getattr(self.mission.platforms, name).motion_error
         return motion_error
 
     def axes(self, name: str, frame: str = "") -> Floats:
-        """Axes of the frame of a platform's errors, or of the given frame, (axes, 3, cases)."""
+        """Axes of a frame at the platform `name`, as unit vectors in scene coordinates, (axes, 3, cases).
+
+        `frame` is the name of the frame. If it is empty, the frame is that of the platform's motion error in the
+        file.
+        """
         path: PlatformState = getattr(self.geometry, name)
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> Floats:
-        """Root-sum-square of the projections of directions on the mid-aperture line of sight, (cases,).
+        """Root-sum-square of the projections of vectors on a platform's line of sight at mid-aperture, (cases,).
 
-        `directions` are (axes, 3, cases). The result has their unit.
+        `name` is the name of the platform. `directions` are the vectors, (axes, 3, cases). The result has their unit.
         """
         look = self.vector(getattr(self.geometry, name).look)
         return np.asarray(np.sqrt(np.square((directions * look).sum(axis=1)).sum(axis=0)))
 
     @cached_property
     def exact(self) -> ExactRanges:
-        """Exact ranges at as many nodes as the paths and random errors need."""
+        """Exact ranges of the cases, at enough nodes to resolve the paths and the random errors."""
         count = nodes_for(self.geometry, self.aperture_time, has_direct_path=self.mission.has_direct_path)
         count = min(MOST_EFFECT_NODES, max(FEWEST_EFFECT_NODES, int(np.max(count))))
         return exact_ranges(self.mission, self.geometry, count, self.cases)
 
     @cached_property
     def weights(self) -> Floats:
-        """Effects per metre of range error at each node, see `effect_weights`."""
+        """Effects on the image per metre of range error at each node, (8, nodes, cases), see `effect_weights`."""
         return effect_weights(self.exact)
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """The matrix Q⁻¹ of the published model."""
+        """Matrix Q⁻¹ of the published model, which maps constant and linear range errors to displacements."""
         return published_planes(self.geometry)[0]
 
     def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
@@ -264,7 +286,7 @@ class SensorCases:
         Returns
         -------
         published, full : RandomEffect
-            Effect in the published and in the full model.
+            Effect of all errors together in the published and in the full model.
         """
         k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
         orders = np.where(
@@ -297,7 +319,7 @@ class SensorCases:
         correlation_time : float or (cases,)
             Correlation time of the processes. [s]
         is_phase_advanced : bool
-            See `effects_of_gauss_markov`.
+            Whether the phase error has the opposite sign of the group delay, see `effects_of_gauss_markov`.
         """
         ratio = self.exact.half / correlation_time
         return self._of_noise(
@@ -305,9 +327,10 @@ class SensorCases:
         )
 
     def of_process(self, covariance: Floats, beyond: PerCase) -> RandomEffect:
-        """Effect, in the full model, of a random range error with a given covariance.
+        """Effect, in the full model, of a random range error with a given covariance over the aperture.
 
-        `covariance` (nodes, nodes, cases) and `beyond` (cases,) are arguments of `effects_of_process`. [m²]
+        `covariance` (nodes, nodes, cases) is the covariance of the range error between the nodes. [m²] `beyond`
+        (cases,) is its mean square in the orders that the nodes cannot distinguish. [m²] See `effects_of_process`.
         """
         return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
 
@@ -318,26 +341,27 @@ class SensorCases:
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects, in both models, of independent position errors of a platform.
+        """Effects, in the published and in the full model, of independent random position errors of a platform.
 
-        `moved` are the position errors at the nodes, (errors, 3, nodes, cases). [m/unit]
+        `moved` (errors, 3, nodes, cases) are the position errors at the nodes. [m/unit]
         """
         look = self.vector(self.geometry.both[platform_index].look)
         return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
     def range_errors(self, platform_index: int, moved: Floats) -> Floats:
-        """Range errors at the nodes caused by small position errors of a platform, (errors, nodes, cases). [m]
+        """Range errors at the nodes due to small position errors of a platform, (errors, nodes, cases). [m]
 
-        `moved` are the position errors, (errors, 3, nodes or 1, cases). [m]
+        `moved` (errors, 3, nodes or 1, cases) are the position errors. [m]
         """
         x, y, z = np.moveaxis(moved, 1, 0)
         return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
-        """Sigmas of the displacement east and north according to (25). [m]
+        """Sigmas of the displacement east and north due to a random range error, according to (25). [m]
 
         `constant` and `linear` are the mean squares of the constant and the linear part of the range error at the
-        aperture edge. [m²] `both` is the mean product of the two parts. [m²]
+        aperture edge. [m²] `both` is the mean product of the two parts. [m²] The sigmas are NaN where the matrix Q is
+        singular.
         """
         half = self.aperture_time / 2
         slope, product = linear / half**2, 2 * both / half
@@ -350,18 +374,19 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Legendre orders 0 to 3 at the nodes, (nodes, 4), scaled as in `orders_at`.
+        """Legendre polynomials of order 0 to 3 at the nodes, (nodes, 4), scaled as in `orders_at`.
 
-        The leading term of each order has the size 1 at the aperture edge.
+        The leading term of each polynomial has the size 1 at the aperture edge.
         """
         return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: PerCase = 1.0) -> tuple[Sequence[Floats], Floats]:
-        """Sigmas and covariance of the effects of errors with given orders 0 to 3, as returned by `sigmas`.
+        """Sigmas and covariance of the effects of random errors, from the covariance of their Legendre orders 0 to 3.
 
-        `covariance` (4, 4, ...) is the covariance of the orders of each independent error at the aperture edge. [m²]
-        `along` (errors, nodes, cases) is the range change per metre of the error. Higher orders are left out: they
-        defocus and displace the image only to second order in the turn of the line of sight.
+        The result is described in the function `sigmas`. `covariance` (4, 4, ...) is the covariance of the orders of
+        each error at the aperture edge. [m²] The errors are independent. `along` (errors, nodes, cases) is the change
+        of the range per metre of each error. Orders above 3 are not included. They defocus and displace the image
+        only to second order in the angle by which the line of sight turns.
         """
         covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
         covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
@@ -372,18 +397,19 @@ class SensorCases:
         return sigmas(total, np.einsum("ffc->fc", total))
 
     def courses(self, covariance: Floats) -> Floats:
-        """Independent variations over the aperture whose sum has a given covariance of orders 0 to 3.
+        """Variations over the aperture whose random sum has a given covariance of the Legendre orders 0 to 3.
 
-        `covariance` is (4, 4, ...). The result is (4, nodes, ...), in the square root of its unit.
+        The sum multiplies each variation by an independent random number of variance 1. `covariance` is (4, 4, ...).
+        The result is (4, nodes, ...), in the square root of the unit of `covariance`.
         """
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects, in both models, of an error with given mean squares of its parts over the aperture.
+        """Effects, in both models, of noise with given mean squares of its parts over the aperture.
 
         `noise` are the mean squares. [m²] `along` (nodes, cases) is the range error in the data per metre of the
-        error. Orders 0 to 3 displace and defocus the image, and the part beyond them spreads power. The result is
+        noise. Orders 0 to 3 displace and defocus the image, and the part beyond them spreads power. The result is
         accurate to 5 % and 0.5 dB for a line of sight that turns by up to 1 rad. Over a full circle it has the same
         accuracy, with two exceptions: for noise as steep as f⁻⁴ the spread is wrong by 1 dB, and the location error
         of free clocks is wrong by 8 % (`tests/effects/test_long_noise.py`).
@@ -399,7 +425,7 @@ class SensorCases:
     def alike(self, value: Value) -> Iterator[tuple[Value, Indices]]:
         """Group the cases for which all arrays in `value` have the same numbers.
 
-        Yields, for each group, the value in plain numbers and the indices of the cases.
+        Yields, for each group, a copy of `value` with plain numbers in place of arrays, and the indices of its cases.
         """
         arrays = list(_arrays_in(value))
         if not arrays:
@@ -411,10 +437,10 @@ class SensorCases:
 
 
 def orders_at(slow_times: Floats) -> Floats:
-    """Legendre orders 0 to 3 at slow times, (times, 4), scaled as in `Parts`.
+    """Legendre polynomials of order 0 to 3 at slow times, (times, 4), scaled as the orders in `Parts`.
 
-    The slow times are in units of half the aperture time. The scale gives the leading term of each order the size 1
-    at the aperture edge.
+    `slow_times` (times,) are in units of half the aperture time. Each polynomial is scaled so that its leading term
+    has the size 1 at the aperture edge.
     """
     return np.asarray(np.polynomial.legendre.legvander(slow_times, LEGENDRE_LEADING.size - 1) / LEGENDRE_LEADING)
 
@@ -428,7 +454,7 @@ def _arrays_in(value: object) -> Iterator[Floats]:
 
 
 def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
-    """Copy a value, replacing each array in it by the next of `numbers`."""
+    """Copy a value or a nested tuple of values, and replace each array in it by the next number of `numbers`."""
     if isinstance(value, tuple):
         values = [_with_numbers(value_part, numbers) for value_part in value]
         return value._make(values) if hasattr(value, "_make") else tuple(values)
@@ -436,21 +462,23 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
-    """Largest value over the axes, (cases,), and the ratio of each value to it, (axes, cases).
+    """Largest of the values of all axes, (cases,), and the ratio of each value to it, (axes, cases).
 
-    The ratio is 1 where the largest value is 0.
+    `values` (axes, cases) are not negative. The ratio is 1 where the largest value is 0.
     """
     largest = values.max(axis=0)
     return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
 
 
 def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]:
-    """Sigmas of the effects, and covariance (4, 4, cases), from a covariance (8, 8, cases) of all effects.
+    """Sigmas of the effects of random errors, and the covariance (4, 4, cases) of phases and displacement.
 
-    The order of the effects is that of `SensorCases.weights`. The sigmas are those of quadratic phase, cubic phase,
-    displacement east and north, and hidden phase, which is the root-sum-square of its four parts. Where terms cancel
-    exactly, the remainder is rounding error, small compared with the squared magnitudes `sizes` (8, cases). It would
-    give a limit where none exists, so it is set to 0.
+    `covariance` (8, 8, cases) is the covariance of all effects, in the order of `SensorCases.weights`. The result has
+    five sigmas: quadratic phase, cubic phase, displacement east, displacement north, and hidden phase. The hidden
+    phase is the root-sum-square of its four parts.
+
+    Where terms cancel exactly, a variance is only rounding error. It is then small compared with the squared
+    magnitude in `sizes` (8, cases). Such a variance would give a limit where none exists, so it is set to 0.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
@@ -460,7 +488,7 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
 
 
 def factor(covariance: Floats) -> Floats:
-    """Factor F of a covariance C, with FFᵀ = C, (..., n, n).
+    """Factor F of a covariance matrix C, with FFᵀ = C, (..., n, n).
 
     The covariance may be singular, and its rows may have different units.
     """

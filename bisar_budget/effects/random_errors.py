@@ -1,9 +1,9 @@
 """List of all random errors of sensors, clocks and the air that a mission names, for one case or many.
 
 The list also contains errors that were analysed elsewhere, and for which the file states only the effect on the
-image: a cubic phase or a displacement. Neither has a sign. A displacement has no direction either, so its east and
-north components each have half of its mean square. A stated quadratic phase has a sign and is listed in `sources`.
-Stated spread power is listed in `analysis.spread`.
+image: a cubic phase or a displacement. Both are stated without a sign. A displacement is also stated without a
+direction, so its east and north components each have half of its mean square. A stated quadratic phase has a sign and
+is listed in `sources`. Stated spread power is listed in `analysis.spread`.
 """
 
 import math
@@ -40,7 +40,8 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
     The list is empty for most missions. For a platform with an inertial sensor, all errors of the sensor are listed,
     declared or not. For a platform with a lever arm, the effect of attitude errors through the arm is listed.
-    `geometry` is the geometry of many cases. Without it, the errors are those of a single case in plain floats.
+    `geometry` is the geometry of many cases, and `cases` is their number. Without `geometry`, the errors are those of
+    a single case in plain floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
@@ -70,9 +71,9 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
-    """Return an error of many cases in plain numbers for one case, including the noise of an oscillator.
+    """Return an error of many cases in plain numbers for one case, including the noise spectrum of an oscillator.
 
-    `mission` is the mission of that case.
+    `mission` is the mission of that case, and `case` is its index in the arrays of `error`.
     """
     published, full = error.published.of(case), error.full.of(case)
     noise = None if error.noise_in_case is None else error.noise_in_case(mission, error.owner)

@@ -1,19 +1,19 @@
 """Random range errors along turning lines of sight, and their effects on the image.
 
-The range error is either a known variation over the aperture times a random size, as for a bias, or a process that
-changes within the aperture: noise of a position, a random walk, a delay of the air. Each effect on the image, a phase
-or a displacement, is an integral of a weight times the range error. Its variance is therefore a double integral of
-the covariance of the range error.
+A range error is of one of two forms. It may be a known variation over the aperture times a random size, as for a
+bias. Or it is a random process that changes within the aperture, such as noise of a position, a random walk, or a
+delay of the air. Each effect on the image, a phase or a displacement, is an integral of a weight times the range
+error. The variance of the effect is therefore a double integral of the covariance of the range error.
 
 A process is resolved into as many Legendre orders as the nodes can distinguish. The weights are smooth and contain no
 higher orders, so the higher orders of a process only spread power. The resolved orders beyond the cubic spread power
 as well. If the line of sight turns, the displacement of the image adds further parts beyond the cubic.
 
 A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is the
-correlation of a constant error. The second term is called the departure. It is computed on its own, so that it goes
+correlation of a constant error. The second term is called the departure. It is computed separately, so that it goes
 to zero without rounding error for a long correlation time.
 
-Derived here. Time series check it in `tests/effects/test_changing_air.py`; random draws and direct sums check it in
+Derived here. Time series check it in `tests/effects/test_changing_air.py`. Random draws and direct sums check it in
 `tests/effects/test_long_noise.py`.
 """
 
@@ -32,12 +32,13 @@ _NODES_PER_OCTAVE = 20  # resolve the correlation within an octave of lags to 1e
 
 
 class RangeEffects(NamedTuple):
-    """Effects of random range errors.
+    """Second moments of the effects of random range errors on the image.
 
     `covariance` (8, 8, cases) is the covariance of the effects, in the order of `effect_weights`. `left` (cases,) is
-    the mean square of the range error beyond the cubic. [m²] `sizes` (8, cases) are the squares of the effects if all
-    terms of their sums added in magnitude. A variance that is very small compared with its size is the rounding error
-    of terms that cancel.
+    the mean square of the range error beyond the cubic. [m²]
+
+    `sizes` (8, cases) are the squares that the effects would have if the terms of their sums did not cancel. A
+    variance that is very small compared with its value in `sizes` is only rounding error.
     """
 
     covariance: Floats
@@ -46,10 +47,10 @@ class RangeEffects(NamedTuple):
 
 
 def effect_weights(exact: ExactRanges) -> Floats:
-    """Effects per metre of range error at each node, (8, nodes, cases).
+    """Effects on the image per metre of range error at each node, (8, nodes, cases).
 
-    The effects are quadratic and cubic phase [rad/m], displacement east and north [m/m], and four parts of the hidden
-    phase. [rad/m]
+    The eight effects are quadratic and cubic phase [rad/m], displacement east and north [m/m], and four parts of the
+    hidden phase. [rad/m]
     """
     return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
 
@@ -57,7 +58,8 @@ def effect_weights(exact: ExactRanges) -> Floats:
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
     """Effects of independent range errors, each a known variation over the aperture times a random size.
 
-    `courses` (errors, nodes, cases) are the range errors at 1 sigma. [m]
+    `weights` are the weights of `effect_weights`. `courses` (errors, nodes, cases) are the range errors at 1 sigma.
+    [m]
     """
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
@@ -79,7 +81,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     covariance : (nodes, nodes, cases)
         Covariance of the range error between the nodes, in the Legendre orders that the nodes can distinguish. [m²]
     beyond : (cases,)
-        Mean square of the range error in higher orders, which spread. [m²]
+        Mean square of the range error in higher orders, which only spread power. [m²]
     """
     orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEGENDRE_LEADING
     higher = np.eye(len(orders)) - orders @ exact.fit  # leaves the part beyond the cubic
@@ -105,12 +107,12 @@ def effects_of_gauss_markov(
     exact, weights
         As for `effects_of_process`.
     courses : (errors, nodes, cases)
-        Range error per unit of each process. For a delay it is the group delay. [m]
+        Range error per unit of each process. For a delay of the air it is the group delay, as a length. [m]
     ratio : (cases,)
         Half the aperture time divided by the correlation time.
     is_phase_advanced : bool
         Whether the phase error has the opposite sign of the group delay, as for free electrons. The mean over the
-        aperture then counts with the sign of the group, and everything else with the opposite sign.
+        aperture then has the sign of the group delay, and the deviation from the mean has the opposite sign.
     """
     ratios, ratio_index = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
     departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
@@ -130,10 +132,11 @@ def effects_of_gauss_markov(
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
-    """Departure exp(−|t|/τ_c) − 1 between nodes, in the Legendre orders that the nodes can distinguish.
+    """Departure exp(−|t|/τ_c) − 1 between each two nodes, in the Legendre orders that the nodes can distinguish.
 
-    The departure has a kink at lag 0, which its plain values at the nodes would not resolve. Therefore it is first
-    integrated against Legendre polynomials. Higher orders are not needed, because smooth weights do not contain them.
+    The departure has a kink at lag 0, which its values at the nodes would not resolve. Therefore it is first
+    integrated against Legendre polynomials. Higher orders are not needed, because the smooth weights do not contain
+    them.
 
     Parameters
     ----------
@@ -145,6 +148,7 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
     Returns
     -------
     (count, count, cases) ndarray
+        The departure for each pair of nodes.
     """
     lags, products = _lagged(count)
     correlation = np.expm1(-np.multiply.outer(ratios, lags))
@@ -158,9 +162,9 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
 def _lagged(count: int) -> tuple[Floats, Floats]:
     """Lags u from 0 to 2, (lags,), and weighted integrals of products of Legendre polynomials, (lags, count, count).
 
-    The lags are in units of half the aperture time. The integrals are ∫P_m(s)·P_n(s + u) ds, added for both signs of
-    the lag, and multiplied by the quadrature weight of the lag. Each octave of lags has the same number of nodes. The
-    nodes therefore become denser towards 0, and resolve correlation times of any length.
+    The lags are in units of half the aperture time. The integrals are ∫P_m(s)·P_n(s + u) ds, the sum for both signs
+    of the lag. They are multiplied by the quadrature weight of the lag. Each octave of lags has the same number of
+    lags. The lags therefore become denser towards 0, and resolve correlation times of any length.
     """
     x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
     edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _LAG_OCTAVE_COUNT, 2)))

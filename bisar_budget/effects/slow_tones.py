@@ -1,10 +1,10 @@
 """Vibrations below three cycles per aperture: phase errors from exact ranges, for the worst phase of the motion.
 
 A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. The effects are computed
-for values of ψ all around the circle, and the largest effect counts. The effects of a small vibration follow from
-those of a cosine and a sine. Where the second order matters, they follow from the image point of exact ranges. Since
-the line of sight turns, motion along the track also has an effect. The vibration also displaces the image, and this
-displacement adds phases.
+for values of ψ all around the circle, and the largest effect counts. The effects of a small vibration follow from the
+effects of a cosine and a sine. Where the second order matters, the effects follow from the image point of exact
+ranges. Since the line of sight turns, motion along the track also has an effect. The vibration also displaces the
+image, and this displacement adds phases.
 
 As a function of ψ, the square of each resulting phase is a sum of harmonics. For a small vibration it has only a
 constant and the second harmonic. A few values of ψ are therefore enough to find the largest square. The axes may
@@ -49,7 +49,7 @@ MAX_LANE_COUNT = 1 << 12  # pairs of case and value of ψ for which one call com
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """Effects of a vibration along each axis, for values of its phase ψ all around the circle.
+    """Phase errors due to a vibration along each axis, for values of its phase ψ all around the circle.
 
     Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
     phase, and rms phase beyond the cubic. [rad]
@@ -61,7 +61,7 @@ class TonePhases:
     rests: Floats
 
     def axes(self) -> list["TonePhases"]:
-        """Effects of each axis as a separate `TonePhases`."""
+        """Split the phase errors into one `TonePhases` for each axis."""
         phases = (self.quadratics, self.cubics, self.hiddens, self.rests)
         return [TonePhases(*(phase[[axis]] for phase in phases)) for axis in range(len(self.quadratics))]
 
@@ -81,24 +81,27 @@ class TonePhases:
         return _worst(np.square(self.rests))
 
     def judged(self, gain: PerCase) -> Floats:
-        """Worst phase for the comparison with a limit that includes autofocus gain, see `Declared.judged`. [rad]
+        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad]
 
-        The result is the sum over the axes, each at its worst phase ψ, (cases,).
+        The result (cases,) is the sum over the axes, each at the worst phase ψ of its vibration.
         """
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
     def hidden(self, gain: PerCase) -> Floats:
-        """Hidden phase that, together with the worst quadratic phase, gives the judged phase, (cases,). [rad]"""
+        """Hidden phase that, together with the worst quadratic phase, gives the phase `judged`, (cases,). [rad]
+
+        `gain` is the autofocus gain.
+        """
         return np.asarray(np.sqrt(np.maximum(self.judged(gain) ** 2 - self.quadratic**2, 0.0)) / gain)
 
 
 class SlowTone(NamedTuple):
-    """A declared vibration and its effects.
+    """A declared vibration below three cycles per aperture, and its effects.
 
-    `per_metre` is the effect per metre of range error, and `declared` the effect of the declared vibration.
-    `is_there` marks the cases in which the vibration has fewer than three cycles per aperture. `hears_part` is true
-    for a vibration that the file states along three axes, and for any vibration in a mission with a direct path,
-    because only a part of the motion is then range error.
+    `per_metre` is the effect of a sinusoidal range error with an amplitude of 1 m. `declared` is the effect of the
+    declared vibration. `is_there` (cases,) marks the cases in which the vibration has fewer than three cycles per
+    aperture. `hears_part` tells that only a part of the motion is range error. It is true for a vibration that the
+    file states along three axes, and for any vibration in a mission with a direct path.
     """
 
     subject: Subject
@@ -109,7 +112,10 @@ class SlowTone(NamedTuple):
 
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
-    """Declared vibrations with fewer than three cycles per aperture in any case, by the ids of their rows."""
+    """Compute the effects of sinusoidal vibrations with fewer than three cycles per aperture in at least one case.
+
+    The keys of the result are the ids of the vibrations' rows.
+    """
     T, is_heard, slow = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
     for platform_index, name in enumerate(PLATFORMS):
@@ -138,9 +144,9 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
 
 
 def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: PerCase) -> list[DeclaredPhase]:
-    """Phases of the vibrations below one cycle per aperture, to be combined with the phases of other errors.
+    """Phase errors due to the vibrations below one cycle per aperture, for sums with the phases of other errors.
 
-    `slow` are the results of `slow_tones`. `gain` is the gain of autofocus.
+    `slow` is the result of `slow_tones`. `gain` is the autofocus gain.
     """
     T, phases = mission.collection.aperture_time, []
     for row_id, tone in slow.items():
@@ -168,7 +174,7 @@ class _Tone:
     def of_range(self, size: PerCase) -> Floats:
         """First-order effects of a sinusoidal range error of amplitude `size`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        The rows are the fields of `TonePhases`. `size` is a number or (nodes, cases). [m]
+        The first axis has the order of the fields of `TonePhases`. `size` is a number or (nodes, cases). [m]
         """
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
@@ -181,9 +187,9 @@ class _Tone:
     def of(self, way: Vectors, size: PerCase) -> Floats:
         """Effects of a motion of amplitude `size` [m] along the direction `way`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        The rows are the fields of `TonePhases`. Each component of `way` is (cases,) or (nodes, cases). The effects
-        are linear in `size`, except in cases where the second order matters. For these cases they are computed from
-        exact ranges.
+        The first axis has the order of the fields of `TonePhases`. Each component of `way` is (cases,) or (nodes,
+        cases). The effects are linear in `size`, except in cases where the second order matters. For these cases they
+        are computed from exact ranges.
         """
         exact, cases = self.exact, self.exact.half.size
         small, size = (
@@ -206,8 +212,8 @@ class _Tone:
     def _of_large(self, way: Vectors, size: Floats, cases: Indices) -> Floats:
         """Effects from exact ranges for the cases with the indices `cases`, (4, TONE_PHASE_COUNT, len(cases)). [rad]
 
-        If no ground point has the range history for a phase ψ of the vibration, each effect is set to the
-        peak-to-peak phase of the motion, 2kA.
+        `way` and `size` are as in `of`. If no ground point has the recorded range history for a phase ψ of the
+        vibration, each effect is set to the peak-to-peak phase of the motion, 2kA, with k = 2π/λ and the amplitude A.
         """
         case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
@@ -225,7 +231,7 @@ def _of_case(component: PerCase, case: Indices) -> PerCase:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Largest effect of each axis over all values of the phase ψ, summed over the axes, (cases,).
+    """Sum over the axes of the largest effect of each axis for any value of the phase ψ, (cases,).
 
     `squares` (axes, TONE_PHASE_COUNT, cases) are the squares of the effects. They are interpolated between the values
     of ψ.

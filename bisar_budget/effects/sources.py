@@ -54,7 +54,8 @@ def exact_ranges(
 ) -> ExactRanges:
     """Exact ranges from the platforms of a mission's cases to the scene centres.
 
-    `count` is the number of nodes. If it is None, as many nodes are used as the cases need.
+    `count` is the number of nodes over the aperture. If it is None, as many nodes are used as the paths of the
+    platforms need. `cases` is the number of cases.
     """
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or int(nodes_for(geometry, T, has_direct_path=is_heard))
@@ -62,7 +63,11 @@ def exact_ranges(
 
 
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
-    """Distribution of a declared error. A size without a stated distribution is a `bound`."""
+    """Name of the distribution of a declared error: `normal`, `uniform` or `bound`.
+
+    A clock error is `normal`, because the file states one sigma. An error of a platform, or of both platforms in
+    common, has the distribution that its motion error states. Any other error is a `bound`.
+    """
     if source.clock is not None:
         # A clock's values are one sigma: the coverage factor multiplies them.
         return "normal"
@@ -78,11 +83,12 @@ _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.p
 
 
 class _Flown(NamedTuple):
-    """Effect and motions of one unit of an error of platforms of which at least one is in free fall.
+    """Effect of one unit of a motion error, and the motions it causes, where at least one platform is in free fall.
 
-    `full` is the effect per unit of a small error. `shifts` are the position errors of both platforms at the nodes,
-    three components (nodes, cases) each. [m/unit] `rates` are the velocities of these position errors at mid-aperture
-    for a position error in the frame `ric`, otherwise None. [m/s/unit]
+    `full` is the effect per unit of a small error by the full model. `shifts` are the position errors of both
+    platforms at the nodes, three components (nodes, cases) each. [m/unit] `rates` are the velocities of these
+    position errors at mid-aperture. [m/s/unit] They are given for a position error in the frame `ric`; for any other
+    error `rates` is None.
     """
 
     full: FullEffect
@@ -104,10 +110,11 @@ class ErrorListing:
         self._full_legs: dict[tuple[int, int], list[FullEffect]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
-        """Yield the errors in the order of the contract.
+        """Yield the signed errors in a fixed order.
 
-        They are errors of position, velocity and acceleration, of the clocks, of both platforms in common, of time
-        tags, of registered kinds, of the terrain, and quadratic phases that the file states directly.
+        First are the errors of each platform's position, velocity and acceleration. Then follow the errors of the
+        clocks, the errors that both platforms share, and the errors of time tags. Last are the errors of registered
+        kinds, the error of the terrain, and the quadratic phases that the file states directly.
         """
         for platform_index, name in enumerate(PLATFORMS):
             for kind in STATE_KINDS:
@@ -131,12 +138,15 @@ class ErrorListing:
         ]
 
     def published_legs(self, platform_index: int, kind: StateKind) -> list[Effect]:
-        """Effects of one unit of a kind of error of one platform along x, y and z by Tables I and II."""
+        """Effects of a unit error of one platform along each of x, y and z by the published model, Tables I and II.
+
+        `kind` is the kind of the error: position, velocity or acceleration.
+        """
         first = 3 * kind.order
         return [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
 
     def full_legs(self, platform_index: int, kind: StateKind) -> list[FullEffect]:
-        """Effects of one unit of a kind of error of one platform along x, y and z by the full model.
+        """Effects of a unit error of one platform along each of x, y and z by the full model.
 
         `kind` is the kind of the error: position, velocity or acceleration. The motion errors are the polynomials of
         (22). For a platform in free fall, `_flown` gives the effects.
@@ -151,8 +161,8 @@ class ErrorListing:
     def _motions(self) -> list[Any]:
         """Motion of each platform in free fall due to unit errors of its state, (3, 3, 3, nodes, cases). [m/unit]
 
-        The axes are kind of error (position, velocity, acceleration), axis of the error, and component of the motion.
-        None for a platform that is not in free fall.
+        The first three axes are the kind of the error (position, velocity, acceleration), its direction (x, y, z),
+        and the component of the motion. The item is None for a platform that is not in free fall.
         """
         exact = self.exact
         return [
@@ -160,15 +170,15 @@ class ErrorListing:
         ]
 
     def _falls(self, platforms: Iterable[int]) -> bool:
-        """Whether any of the platforms, given by index, is in free fall."""
+        """Whether any of the platforms with the given indices is in free fall."""
         return any(self._motions[platform_index] is not None for platform_index in platforms)
 
     def _flown(self, kind: StateKind, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
-        """Motions of errors of platforms of which at least one is in free fall, with their effects.
+        """Effects of motion errors, and the motions they cause, where at least one platform is in free fall.
 
         In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are relative to
-        the stars, so the vector of a position error without a velocity error does not rotate relative to the stars.
-        In all other frames it rotates with the Earth.
+        the stars. In this frame, the vector of a position error without a velocity error therefore does not rotate
+        relative to the stars. In all other frames it rotates with the Earth.
 
         Parameters
         ----------
@@ -277,7 +287,7 @@ class ErrorListing:
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
-        """Yield the errors of the clocks: terms of the clock error, errors left by setting the clocks, and aging.
+        """Yield the errors of the clocks: terms of the clock error, errors that remain after a setting, and aging.
 
         With a direct path, the terms of the clock error have no effect in the full model.
         """
@@ -311,10 +321,11 @@ class ErrorListing:
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
-        """Create a clock error, one unit of which is t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`.
+        """Create a clock error whose unit is the time error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`.
 
-        `is_heard` tells whether the data contain the error. If not, it has no effect in the full model. The published
-        model always includes it.
+        `value` is the declared size without the coverage factor; None if the file declares no size. `is_heard` tells
+        whether the data contain the error. If not, it has no effect in the full model. The published model always
+        includes it.
         """
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
@@ -337,9 +348,10 @@ class ErrorListing:
         )
 
     def _of_setting(self) -> Iterator[ErrorSource]:
-        """Yield the time and frequency errors that remain after the clocks are set.
+        """Yield the errors of time and frequency that remain after the clocks are set.
 
-        In holdover they are listed even if they are not declared.
+        If the clocks run free after the setting (`holdover`), the errors are listed even if the file does not declare
+        them.
         """
         sync = self.mission.synchronization
         if sync is None:
@@ -366,7 +378,7 @@ class ErrorListing:
 
     @property
     def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
-        """Coefficients of a cubic polynomial in slow time: the delay of the echo after the direct path in seconds.
+        """Delay of the echo after the direct path, as coefficients of a cubic polynomial in slow time. [s, s/s, …]
 
         A clock with a frequency error measures this delay with a proportional error.
         """
@@ -381,7 +393,7 @@ class ErrorListing:
     def _of_aging(self, name: str) -> Iterator[ErrorSource]:
         """Yield the error due to a frequency drift D [1/s] of an oscillator: a time error of D·(H + τ)²/2. [s]
 
-        H is the time from the setting of the clocks to mid-aperture. Without an age, only the quadratic term is
+        H is the time from the setting of the clocks to mid-aperture. If H is not known, only the quadratic term is
         known, and the location is not judged. A synchronization link removes all of the drift.
         """
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
@@ -414,7 +426,7 @@ class ErrorListing:
         """Yield the errors that both platforms share.
 
         An error along an axis of the scene, such as a bias of one GNSS service, moves both measured paths by the same
-        vector. An error along an axis of another frame moves each path along that axis of its own frame. The range
+        vector. An error along an axis of another frame moves each path along the axis of its own frame. The range
         error is linear in the errors, and so are Table I and the full model. The common effect is therefore the sum
         of the effects of both platforms, with their signs.
         """
@@ -469,20 +481,21 @@ class ErrorListing:
 
     @staticmethod
     def _of_both(legs: Sequence[Sequence[AnyEffect]], axis: int, ways: Sequence[Vectors] | None) -> AnyEffect:
-        """Effect of a unit error of both platforms, from the effects of each platform along x, y and z.
+        """Effect of a unit error that both platforms share, from the effects for each platform along x, y and z.
 
-        The error is along the axis of the scene with the index `axis`. If `ways` is given, the error of each platform
-        is along its direction in `ways` instead.
+        `legs` has the three effects of each platform. `axis` is the index of the scene axis along which the error
+        acts. If `ways` is given, it has the direction of the error for each platform, and `axis` is not used.
         """
         if ways is None:
             return _sum([effects[axis] for effects in legs])
         return _sum([_along(effects, way) for effects, way in zip(legs, ways, strict=True)])
 
     def _of_time_tags(self) -> Iterator[ErrorSource]:
-        """Yield the errors of the navigation's time relative to the radar's, of each platform and of both in common.
+        """Yield the errors of navigation time relative to radar time, for each platform and for both in common.
 
-        The position is measured a time δt too late, so the position error is p(τ + δt) − p(τ). For a small δt it is
-        v(τ)·δt. For a larger δt, exact ranges use the path p itself.
+        With a time-tag error δt, the position is measured a time δt too late. The position error is then p(τ + δt) −
+        p(τ), with the path p. For a small δt it is v(τ)·δt, with the velocity v. For a larger δt, exact ranges use
+        the path itself.
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -529,15 +542,15 @@ class ErrorListing:
         )
 
     def _velocities(self, path: PlatformState) -> Vectors:
-        """Velocity of a path at the nodes, three components (nodes, cases). [m/s]"""
+        """Velocity of a platform at the nodes, three components (nodes, cases). [m/s]"""
         times = self.exact.times
         u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
         return (u, v, w)
 
     def _of_registered_kinds(self) -> Iterator[ErrorSource]:
-        """Yield the errors of the kinds that packages register, with the effects of the motion that each kind gives.
+        """Yield the errors of kinds that packages register, with the effects of the motion that each kind defines.
 
-        The published model projects the motion on the line of sight at mid-aperture and uses the Legendre orders of
+        The published model projects the motion on the line of sight at mid-aperture, and uses the Legendre orders of
         the projection.
         """
         exact = self.exact
@@ -569,12 +582,12 @@ class ErrorListing:
                 )
 
     def _resolved(self, kind: MotionKind, path: PlatformState) -> Floats:
-        """Motion per unit of a registered kind of error at the nodes, (3, nodes, cases). [m/unit]
+        """Motion due to one unit of a registered kind of error at the nodes, (3, nodes, cases). [m/unit]
 
         Raises
         ------
         MotionKindError
-            The motion cannot be used, or the polynomial through the nodes is not the motion between the nodes.
+            The motion cannot be used, or it changes so fast that the nodes do not resolve it.
         """
         exact, places = self.exact, self.exact.sampling.places
         moved = kind.moved(path, exact.times)
@@ -591,7 +604,7 @@ class ErrorListing:
         return moved
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
-        """Yield the error due to a scene that is higher than the processor assumes; nothing if the file states none.
+        """Yield the error of a scene that is higher than the processor assumes, if the file states such an error.
 
         Its effect is that of measuring both platforms too high by the same amount.
         """
@@ -634,7 +647,7 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Texts for the rows of errors along the axes x, y and z of the scene.
+    """Texts for the rows of a platform's errors of one kind along the axes x, y and z of the scene.
 
     Each item has the row's subject, its key path in the file, its equation, and the reason why it may have no limit.
     """
@@ -654,8 +667,10 @@ def _along_scene_axis(
 ) -> PerCase:
     """Size, along one axis of the scene, of three errors that are stated along the axes of another frame.
 
-    The three errors are independent: the squares of one-sigma values add, and the magnitudes of bounds add. A plain
-    rotation of the signed values would let them cancel. It determines only the sign of the result.
+    `declared` are the three errors. `axes` are unit vectors of the frame in scene coordinates, and `axis` is the
+    index of the scene axis. The three errors are independent: the squares of one-sigma values add, and the magnitudes
+    of bounds add. In a plain rotation of the signed values they could cancel. The rotation determines only the sign
+    of the result.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -665,7 +680,8 @@ def _along_scene_axis(
 def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[PerCase]) -> PerCase:
     """Sigma √(dᵀCd) of the position error [m] or velocity error [m/s] along a unit direction d.
 
-    C is the covariance of the three errors, and d has its components along the axes of the covariance's frame.
+    C is the covariance of the three errors. `direction` has the components of d along the axes of the frame in which
+    C is stated. `kind` is `position` or `velocity`.
     """
     parts = [sigma * along for sigma, along in zip(covariance.of(kind), direction, strict=True)]
     return np.sqrt(squared(covariance.block(kind), parts))
@@ -678,7 +694,7 @@ def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
 
 
 def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
-    """Vectors of both platforms, from a mapping of the index of a platform to its vector.
+    """Convert a mapping of platform index to vector to a pair of vectors, transmitter first.
 
     A platform that is missing in the mapping gets the vector of the other platform, which is not used.
     """
@@ -687,7 +703,10 @@ def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, Any
 
 
 def _of_each(effects: FullEffect) -> list[FullEffect]:
-    """Split the effects of several errors, (errors, cases), into one effect (cases,) for each error."""
+    """Split the effects of several errors into one effect for each error.
+
+    The fields of `effects` are (errors, cases). The fields of each resulting effect are (cases,).
+    """
     return [FullEffect._make(row) for row in zip(*map(np.asarray, effects), strict=True)]
 
 
@@ -696,7 +715,10 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 
 
 def _total(terms: Sequence[PerCase]) -> PerCase:
-    """Sum of terms; 0 if they cancel except for rounding errors, which would give a limit where none exists."""
+    """Sum of terms; 0 if the terms cancel except for rounding errors.
+
+    A sum that is only rounding error would give a limit where none exists.
+    """
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
 
@@ -713,7 +735,10 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: StateKind, axis: str) -> Note:
-    """Note on why an error has no QPE limit."""
+    """Note on why an error of one kind along one axis may have no QPE limit.
+
+    `axis` is the name of the axis in the note.
+    """
     if kind.order == 0:
         return phrases.note("no-quadratic-term-of-position")
     vector, _ = _DEFOCUSING_VECTORS[kind.name]

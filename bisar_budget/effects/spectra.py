@@ -1,7 +1,7 @@
 """Parts of phase noise over an aperture: spectra of power-law pieces, weighted with the Legendre parts of a tone.
 
-Spectra are one-sided, for phase at the radar's centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a
-spectrum.
+The parts are a constant, linear, quadratic and cubic part, and the phase beyond the cubic. Spectra are one-sided, for
+phase at the radar's centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a spectrum.
 
 The integrals use the angle x = πfT in place of the frequency f. The edges of the integration panels are then the same
 for every aperture time T, and so is the integral of a power law between two edges. Only the ends of a piece are
@@ -25,16 +25,16 @@ SERIES_ANGLE_RAD = 0.5  # angle or ratio; below it, terms cancel, and a series i
 
 
 class Parts(NamedTuple):
-    """Mean squares of the parts of a phase over the aperture. [rad²]
+    """Mean squares and mean products of the Legendre parts of a phase over the aperture. [rad²]
 
-    `quadratic` and `cubic` are the mean squares of these parts at the aperture edge. `left` is the mean square of the
-    phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and the linear part at the
-    aperture edge, which displace the image. `constant_quadratic` and `linear_cubic` are mean products of two parts.
-    `constant`, `linear` and both mean products are infinite if slow noise has no bound.
+    `quadratic` and `cubic` are the mean squares of the quadratic and the cubic part at the aperture edge. `left` is
+    the mean square of the phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and
+    the linear part at the aperture edge, which displace the image. `constant_quadratic` and `linear_cubic` are mean
+    products of two parts. `constant`, `linear` and these two mean products are infinite if slow noise has no bound.
 
-    `constant_linear`, `constant_cubic` and `linear_quadratic` are mean products of parts of even and odd order. They
-    are nonzero only for the phase of a clock that was set before the aperture. In any other phase, even and odd
-    orders are uncorrelated.
+    `constant_linear`, `constant_cubic` and `linear_quadratic` are mean products of a part of even order and a part of
+    odd order. They are nonzero only for the phase of a clock that was set before the aperture. In any other phase,
+    even and odd orders are uncorrelated.
     """
 
     quadratic: PerCase
@@ -68,23 +68,26 @@ class Parts(NamedTuple):
         return np.array(np.broadcast_arrays(*self))
 
     def times(self, power: PerCase) -> "Parts":
-        """Multiply all mean squares and mean products by the factor `power`."""
+        """Multiply all mean squares and mean products by the power ratio `power`."""
         return Parts(*(mean_square * power for mean_square in self))
 
     @property
     def of_high_orders(self) -> "Parts":
-        """Parts of the same phase without its constant and linear part."""
+        """Copy of the parts with the constant part, the linear part and their mean products set to 0."""
         nothing = 0.0 * self.quadratic
         return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
 
     def without_constant(self) -> "Parts":
-        """Parts of the same phase without its constant part, if a constant phase does not displace the image."""
+        """Copy of the parts with the constant part set to 0.
+
+        It is used where a constant phase does not displace the image.
+        """
         nothing = 0.0 * self.quadratic
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
 def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
-    """Parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
+    """Mean squares of the parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
 
     `aperture_time` and `correlation_time` τ_c are in s.
     """
@@ -96,10 +99,10 @@ def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
 
 
 def tone(angle: PerCase) -> Floats:
-    """Parts of a tone of amplitude 1 over the aperture, each for the worst phase of the tone, (5, ...).
+    """Largest parts of a tone of amplitude 1 over the aperture, each at the worst phase of the tone, (5, ...).
 
     `angle` is πfT. [rad] The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
-    constant part, and linear part. The parts are amplitudes at the aperture edge.
+    constant part, and linear part. The four parts are amplitudes at the aperture edge.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
@@ -109,7 +112,7 @@ def tone(angle: PerCase) -> Floats:
 
 
 def held(step: PerCase) -> PerCase:
-    """Ratio sinc⁴ of the spectrum of white samples joined by straight lines to its value at 0 Hz.
+    """Spectrum of independent samples joined by straight lines, relative to its value at 0 Hz: sinc⁴.
 
     `step` is 2π times frequency times sampling interval. [rad]
     """
@@ -141,9 +144,9 @@ _MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
-    """Edges of the frequency panels, in rising order. [Hz]
+    """Edges of the frequency panels for integrals over the parts of a tone, in rising order. [Hz]
 
-    Within a panel the parts of a tone are smooth functions of frequency.
+    `aperture_time` is in s. Within a panel the parts of a tone are smooth functions of frequency.
     """
     scale = math.pi * aperture_time
     edges = [_FIRST_POWER_ANGLE_RAD / scale * _OCTAVE_RATIO**n for n in range(4)]
@@ -154,7 +157,7 @@ _EDGES = np.array(_tone_edges(1 / math.pi))  # edges as angles πfT
 
 
 class PowerLawPiece(NamedTuple):
-    """Piece of a spectrum: density·f^(−slope) [rad²/Hz] from `low` to `high`. [Hz]"""
+    """Piece of a spectrum: the power law density·f^(−slope) [rad²/Hz] from the frequency `low` to `high`. [Hz]"""
 
     low: float
     high: float
@@ -162,11 +165,11 @@ class PowerLawPiece(NamedTuple):
     slope: float
 
     def at(self, f: PerCase) -> PerCase:
-        """Density of the power law at the frequencies `f` [Hz], also outside the piece. [rad²/Hz]"""
+        """Density of the power law at the frequencies `f` [Hz], which may also be outside the piece. [rad²/Hz]"""
         return self.density * f**-self.slope
 
     def integral(self, low: float, high: float) -> float:
-        """Integral of the power law between two frequencies [Hz]. [rad²]
+        """Integral of the power law from the frequency `low` to `high` [Hz], which may be outside the piece. [rad²]
 
         `low` may be zero if the integral converges.
         """
@@ -177,7 +180,7 @@ class PowerLawPiece(NamedTuple):
 
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
-    """Density of a spectrum at frequencies [Hz]; 0 outside all pieces. [rad²/Hz]"""
+    """Density of a spectrum at the given frequencies [Hz]; 0 outside all pieces. [rad²/Hz]"""
     total = np.zeros_like(frequency)
     for piece in pieces:
         is_in = (piece.low <= frequency) & (frequency < piece.high)
@@ -186,7 +189,9 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
-    """Integrate a spectrum weighted with the squared parts of a tone, accurate to 1e-4.
+    """Integrate a spectrum, weighted with the squared parts of a tone, to the mean squares of the parts of the phase.
+
+    The result is accurate to 1e-4.
 
     Parameters
     ----------
@@ -207,10 +212,10 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Parts of a phase spectrum over apertures, after synchronization if there is one, (cases,) each.
+    """Mean squares of the parts of the phase that remains after synchronization, (cases,) each.
 
-    `aperture_time` is (cases,). [s] `interval` is the interval of the exchanged pulses [s]; None without
-    synchronization.
+    `pieces` are the pieces of the phase spectrum before synchronization. `aperture_time` is (cases,). [s] `interval`
+    is the interval of the exchanged pulses [s]; None if pulses are not exchanged, so that all of the phase remains.
     """
     times, time_index = np.unique(aperture_time, return_inverse=True)
     parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
@@ -218,12 +223,12 @@ def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval:
 
 
 def _like(total: Floats, aperture_time: PerCase) -> Parts:
-    """Convert the array of parts to `Parts`: of arrays if `aperture_time` is an array, otherwise of numbers."""
+    """Convert an array (parts, cases) to `Parts`, with plain numbers as fields if `aperture_time` is a number."""
     return Parts(*total) if np.ndim(aperture_time) else Parts(*total[:, 0].tolist())
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a spectrum x^(−slope) between the angles `low` and `high`, (parts, cases)."""
+    """Parts due to a spectrum x^(−slope) between the angles `low` and `high`, (parts, cases)."""
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
     has_edge = last > first
@@ -236,15 +241,15 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Parts of a spectrum x^(−slope) from the first edge to each edge, (parts, edges)."""
+    """Parts due to a spectrum x^(−slope) from the first panel edge to each edge, (parts, edges)."""
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
     return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a spectrum x^(−slope) within a panel at the end of a piece, (parts, cases).
+    """Parts due to a spectrum x^(−slope) between the angles `low` and `high` within one panel, (parts, cases).
 
-    Slow and fast tones have their own formulas. The result is 0 for a panel of zero width.
+    Slow tones and fast tones have their own formulas. The result is 0 for a panel of zero width.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -268,7 +273,7 @@ def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a power law for slow tones.
+    """Parts due to a spectrum x^(−slope) between two angles of slow tones, (parts, cases).
 
     The quadratic and cubic part, the power beyond the cubic, the constant and the linear part of a tone are replaced
     by their leading powers x²/2, x³/6, x⁸/99225, 1 and x.
@@ -278,13 +283,19 @@ def _slow(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a power law for fast tones; terms that oscillate with the tone are averaged."""
+    """Parts due to a spectrum x^(−slope) between two angles of fast tones, (parts, cases).
+
+    Terms that oscillate with the angle x are averaged.
+    """
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts of a spectrum x^(−slope) over panels (n,), by Gauss–Legendre quadrature."""
+    """Parts due to a spectrum x^(−slope) over n panels, by Gauss–Legendre quadrature, (parts, n).
+
+    `low` and `high` (n,) are the ends of the panels, as angles.
+    """
     span = np.log(high / low)
     x = low * np.exp(span * _LEGENDRE_NODES)
     power = x**-slope * x * span * _LEGENDRE_WEIGHTS
@@ -292,11 +303,12 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def squares(angle: Floats) -> Floats:
-    """Squares of a tone's parts, its power beyond the cubic, and products of parts, in the order of `Parts`.
+    """Squares of a tone's parts, its power beyond the cubic, and two products of parts, in the order of `Parts`.
 
-    These are the mean values for a tone of power 1 and random phase. They are also the values for a tone of amplitude
-    1 if each part has its worst phase. The phase of order n is shifted by n quarter cycles, so orders that differ by
-    two have opposite signs.
+    `angle` is πfT. [rad] The products are constant times quadratic part, and linear times cubic part. All values are
+    mean values for a tone of power 1 and random phase. They are also the values for a tone of amplitude 1 if each
+    part has its worst phase. The part of order n is shifted in phase by n quarter cycles, so parts whose orders
+    differ by two have opposite signs.
     """
     quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -313,13 +325,13 @@ _GRID_AGES_CYCLES = np.concatenate(
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
-    """Integrate a spectrum for the phase of a clock that was set before the aperture, (cases,).
+    """Integrate a spectrum to the parts of the phase of a clock that was set before the aperture, (cases,) each.
 
     Setting the clock subtracts a line that is fitted to the clock's phase over the averaging time, at an age H before
     mid-aperture. With x = πfT, y = πft_c and θ = 2πfH, a tone then has order 0, A₀ = j₀(x) − e^(−iθ)·[j₀(y) +
-    H·(6i/t_c)·j₁(y)], and order 1, A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y), at the aperture edge. Higher orders
-    are those of the free clock. Derived here. The result is bounded for spectra up to a slope of f⁻⁴. Above 24 cycles
-    within the age, the phases during setting and aperture are treated as uncorrelated.
+    H·(6i/t_c)·j₁(y)], and order 1, A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y), at the aperture edge. The higher
+    orders are the same as for a free clock. Derived here. The result is bounded for spectra up to a slope of f⁻⁴.
+    Above 24 cycles within the age, the phases during setting and aperture are treated as uncorrelated.
 
     Parameters
     ----------
@@ -367,7 +379,7 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
     """Yield the mean squares and mean products of the orders of a tone of power 1, for a clock that was set.
 
     The line that was fitted to set the clock is subtracted. The values are Re(A_m·A_n*), in the shape of `f` [Hz],
-    for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13.
+    for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13. The amplitudes A₀ and A₁ are given in `set_parts`.
     """
     quadratic, cubic, _, constant, linear = tone(math.pi * f * aperture_time)
     *_, mean, slope = tone(math.pi * f * averaging)
@@ -387,12 +399,14 @@ _FOLLOWED_DELAY_CYCLES = 12  # cycles of a tone within the delay up to which pan
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
-    """Integrate the spectrum of the phase difference of a clock between two times: S·4 sin²(πfΔt).
+    """Integrate the spectrum of the difference of a clock's phase between two times, S·4 sin²(πfΔt), to its parts.
+
+    S is the spectrum of the phase itself.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
-        Pieces of a one-sided spectrum. [rad²/Hz]
+        Pieces of the one-sided spectrum S. [rad²/Hz]
     aperture_time, delay : float or (cases,)
         Aperture time T, and time Δt between the two times. [s]
     """
@@ -415,14 +429,14 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
-    """Integrate the spectrum that remains after synchronization.
+    """Integrate the phase spectrum that remains after synchronization by exchanged pulses to the parts of the phase.
 
     The phase is sampled at an `interval` T_s. [s] The remaining phase is the phase less the straight lines that join
     its samples. The lines contain sinc²(f·T_s) of a tone's amplitude at its own frequency f, and fold onto f every
     tone at a distance of m/T_s. A spectrum S becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may
     begin at any instant within the interval. Pieces may be narrow or steep, and may begin and end anywhere. The
-    result is accurate to 1e-4, except for tones of more than 24 cycles within the aperture, whose parts are averaged
-    over their cycles.
+    result is accurate to 1e-4. An exception are tones of more than 24 cycles within the aperture, whose parts are
+    averaged over their cycles.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -438,9 +452,10 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Parts of independent samples of variance 1 joined by straight lines.
+    """Mean squares of the parts of a phase made of independent samples of variance 1 joined by straight lines.
 
-    The samples have the `interval` T_s. [s] The one-sided spectrum is 2·T_s·sinc⁴(f·T_s). Its total power is ⅔.
+    The samples have the `interval` T_s. [s] The one-sided spectrum of the phase is 2·T_s·sinc⁴(f·T_s). Its total
+    power is ⅔.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
@@ -457,10 +472,10 @@ def _over_panels(
     high: Floats,
     scale: Floats,
 ) -> Floats:
-    """Integrate a density, weighted with the squared parts of a tone, over panels from 0 Hz on.
+    """Integrate a spectrum, weighted with the squared parts of a tone, over panels from 0 Hz on, (parts, cases).
 
-    `density` is a function of frequencies and cases. `edges` are the edges of the panels of each case, and `high` is
-    the end of the last panel. [Hz] `scale` is πT. The result is (parts, cases).
+    `density` is the spectrum, a function of frequencies and of the indices of their cases. `edges` are the edges of
+    the panels of each case, and `high` (cases,) is the end of the last panel. [Hz] `scale` (cases,) is πT. [s]
     """
     panels = [
         (low, top, case)
@@ -479,9 +494,9 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add to `total` the parts of a spectrum above the frequencies `last` [Hz], multiplied by `times`.
+    """Add to `total` the parts due to a spectrum above the frequencies `last` [Hz], multiplied by `times`.
 
-    `scale` is πT. The terms that oscillate with a tone are averaged.
+    `total` is (parts, cases). `scale` is πT. [s] Terms that oscillate with the angle πfT are averaged.
     """
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
@@ -491,10 +506,10 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
-    """Parts of a spectrum over frequency panels (n,), by Gauss–Legendre quadrature, (parts, n).
+    """Parts due to a spectrum over n frequency panels, by Gauss–Legendre quadrature, (parts, n).
 
-    `density` is the spectrum as a function of frequency. `low` and `high` are the ends of the panels. [Hz] `scale` is
-    πT.
+    `density` is the spectrum as a function of frequency. `low` and `high` (n,) are the ends of the panels. [Hz]
+    `scale` (n,) is πT. [s]
     """
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
@@ -509,9 +524,10 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
 
 
 def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
-    """Spectrum that remains after synchronization, at frequencies `f` (nodes, n) of the nodes of panels. [rad²/Hz]
+    """Spectrum that remains after synchronization, at frequencies `f` (nodes, n). [rad²/Hz]
 
-    `rate` is the sampling rate. [Hz]
+    `f` are the frequencies of the nodes of n panels. [Hz] `rate` is the rate at which synchronization samples the
+    phase. [Hz]
     """
     _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
     f = f[:, once]
@@ -527,10 +543,10 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 
 
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
-    """Sum of the density of a piece at m·rate ± start, for m = 1, 2 … [rad²/Hz]
+    """Sum of the densities of a piece at the frequencies m·rate ± start, for m = 1, 2 … [rad²/Hz]
 
-    `start` is at most half the sampling rate. Near aliases, where the power law changes much within one rate, are
-    added one by one. The Euler–Maclaurin formula gives the sum of all other aliases.
+    `start` is at most half the sampling rate. [Hz] Near aliases, where the power law changes much within one sampling
+    rate, are added one by one. The Euler–Maclaurin formula gives the sum of all other aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
@@ -546,11 +562,12 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
 
 
 def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
-    """Mean spectrum of the images that are not computed singly, as pieces of a power law f⁻⁴.
+    """Mean spectrum of the images that are not computed one by one, as pieces of a power law f⁻⁴.
 
-    The mean is (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency have a distance of x sampling rates from
-    the multiples of the rate. According to the Euler–Maclaurin formula, the mean lacks the term B₂(x) times the slope
-    at its lower end. Pieces that begin half a rate lower and half a rate higher replace that term.
+    An image is the part of a spectrum that synchronization folds to another frequency. The mean is (2/T_s³)·∫
+    S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency have a distance of x sampling rates from the multiples of the
+    rate. According to the Euler–Maclaurin formula, the mean lacks the term B₂(x) times the slope at its lower end.
+    Pieces that begin half a rate lower and half a rate higher replace that term.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _LEGENDRE_NODES
@@ -568,8 +585,9 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
 def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) -> Floats:
     """Sum of a power law at steps from `low` to `high`, both included, by the Euler–Maclaurin formula. [rad²/Hz]
 
-    The sum is the integral divided by the step, plus half of the values at both ends, plus B₂ₖ/(2k)!·step^(2k−1)
-    times the difference of odd derivatives between the ends. The first, third and fifth derivative are used.
+    `low`, `high` and `step` are in Hz. The sum is the integral divided by the step, plus half of the values at both
+    ends, plus B₂ₖ/(2k)!·step^(2k−1) times the difference of odd derivatives between the ends. The first, third and
+    fifth derivatives are used.
     """
     slope, density, derivatives = piece.slope, [], []
     for f in (low, high):
@@ -584,10 +602,10 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
-    """Edges of frequency panels for synchronized phases. [Hz]
+    """Edges of the frequency panels for a phase that is synchronized or compared with itself after an interval. [Hz]
 
-    Within a panel, the parts of a tone, and the part of the tone that the straight lines contain, are smooth
-    functions of frequency.
+    `aperture_time` is in s. `rate` is the inverse of the interval. [Hz] Within a panel, the parts of a tone are
+    smooth functions of frequency. So is the fraction of the tone that the straight lines between samples contain.
     """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
@@ -600,7 +618,8 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
 def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
     """Edges of frequency panels within which a spectrum and its images are smooth. [Hz]
 
-    `ends` are the ends of the pieces of the spectrum. [Hz]
+    An image is the part of a spectrum that synchronization folds to another frequency. `ends` are the ends of the
+    pieces of the spectrum. [Hz] `rate` is the sampling rate of the synchronization. [Hz]
     """
     starts = {abs(end - round(end / rate) * rate) for end in ends}
     images = [
@@ -612,7 +631,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Yield the ends of a piece, and the frequencies where a steep piece has fallen by certain powers of e. [Hz]"""
+    """Yield the ends of a piece, and the frequencies to which a steep piece falls by certain powers of e. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high
@@ -621,10 +640,10 @@ def _ends(piece: PowerLawPiece) -> Iterator[float]:
 
 
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Lower and upper ends of the frequency panels between 0 Hz and `high` that the edges separate. [Hz]
+    """Lower and upper ends of the frequency panels into which `edges` divide the range from 0 Hz to `high`. [Hz]
 
-    Edges that differ only by rounding count as one. A frequency in a panel between them could be folded onto 0 Hz,
-    where a spectrum has no value.
+    Edges that differ only by rounding count as a single edge. A frequency in a panel between them could be folded
+    onto 0 Hz, where a spectrum has no value.
     """
     kept = [0.0]
     for edge in sorted(edges):

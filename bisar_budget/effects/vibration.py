@@ -4,23 +4,24 @@ If the receiver uses the direct path as its clock, the data contain ranges less 
 vibration is then its effect on this difference.
 
 A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts of order 2 and 3
-over the aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ; the phases at the aperture edge are 3/2 and 5/2 of these parts. Its
-sign and phase are unknown. Like any other error, it is compared alone with a limit, and is part of sums and
-root-sum-squares.
+over the aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ. The phases at the aperture edge are 3/2 and 5/2 of these parts. Their
+signs are unknown, because the phase of the vibration is unknown. Like any other error, the vibration is compared
+alone with a limit, and is part of sums and root-sum-squares.
 
 A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n resolution cells from the response. An
 echo has φ/2 times the amplitude of the response and the same shape. For a uniform aperture the shape is sinc(x) =
 sin(πx)/(πx), whose sidelobes reach the next echo. The phases of vibrations are unknown. In the worst case, several
 echoes add in phase at a position x. Their sum is Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum is
 used. Derived here. From three cycles per aperture on, this agrees within 0.5 dB with transforms of the phasor for the
-worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are left out; they add up to 0.3 dB at three cycles,
-and less beyond.
+worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are left out. They would add up to 0.3 dB at three
+cycles, and less at more cycles.
 
 A spectrum S_a of acceleration corresponds to the spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase,
 cubic phase, spread and displacement are the integrals of `spectra`. Motion slower than the aperture is therefore
 included as the phase that it causes.
 
-Numbers of a mission may be arrays (cases,). The geometry then has the same cases; otherwise it is the mission's own.
+The numbers in a mission may be arrays (cases,). The geometry then has the same cases. Otherwise it is the mission's
+own.
 """
 
 import math
@@ -61,10 +62,10 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 
 # ---------------------------------------------------------------------- echoes that add
 class Worst(NamedTuple):
-    """Highest echo of several tones in their worst phases.
+    """Highest echo that several tones make together in their worst phases.
 
-    `amplitude` is the amplitude of a single tone with an equally high echo, and `cycles` is the position of that
-    echo.
+    `amplitude` is the amplitude of a single tone with an equally high echo. `cycles` is the position of the highest
+    echo, in resolution cells; a tone has its own echo at its number of cycles per aperture.
     """
 
     amplitude: PerCase
@@ -72,11 +73,11 @@ class Worst(NamedTuple):
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Numbers of the groups of tones whose neighbours in frequency are at most 2.5 cycles per aperture apart.
+    """Number of the group to which each tone belongs, where neighbours are at most 2.5 cycles per aperture apart.
 
     `cycles` are the cycles per aperture of the tones, (n, cases). The result has the same shape. A group has two or
-    more tones. The groups of a case are numbered in order of frequency. Tones outside all groups, and tones below one
-    cycle per aperture, have the number -1.
+    more tones. The groups of a case are numbered from 0 in order of frequency. A tone outside all groups, or below
+    one cycle per aperture, has the number -1.
     """
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
@@ -91,9 +92,10 @@ def near_groups(cycles: Floats) -> NDArray[np.intp]:
 
 
 def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
-    """Indices of the tones in each group of neighbouring tones, for a single case, in order of frequency.
+    """Indices of the tones in each group of neighbouring tones, for a single case.
 
-    `cycles` are the cycles per aperture of the tones. The groups are those of `near_groups`.
+    `cycles` are the cycles per aperture of the tones. The groups are defined as in `near_groups`, and are in order of
+    frequency.
     """
     if not cycles:
         return []
@@ -109,9 +111,9 @@ def worst_phases(
     Parameters
     ----------
     amplitudes : (n,) or (n, cases)
-        Amplitudes, 0 to peak, in any unit.
+        Amplitudes of the tones, 0 to peak, in any unit.
     cycles : same shape
-        Cycles per aperture.
+        Cycles per aperture of the tones.
     is_member : same shape, optional
         Whether a tone is included, at least one in each case. If omitted, all tones are included.
 
@@ -119,7 +121,7 @@ def worst_phases(
     -------
     Worst
         Amplitude of a single tone with an equally high echo, in the unit of `amplitudes`, and position of the echo.
-        The amplitude is at least the largest amplitude. If all tones have one frequency, it is the sum of all
+        The amplitude is at least the largest amplitude. If all tones have the same frequency, it is the sum of all
         amplitudes.
     """
     sizes, frequencies = np.asarray(amplitudes, dtype=float), np.asarray(cycles, dtype=float)
@@ -153,9 +155,11 @@ def worst_phases(
 
 
 def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
-    """Starting points with the highest expected echo, without duplicates.
+    """Select the starting points of the search that have the highest expected echo, without duplicates.
 
-    The points are ranked by the sum of the amplitudes of the tones within one cell of the point.
+    The points are ranked by the sum of the amplitudes of the tones within one resolution cell of the point. `sizes`
+    are the amplitudes (tones, cases), and `frequencies` the cycles per aperture of the tones. `starts` (points,
+    cases) are the positions in cells.
     """
     summed = np.concatenate((np.zeros((1, sizes.shape[1])), np.cumsum(sizes, axis=0)))
     before, until = (_count(frequencies, starts, reach) for reach in (-1, 1))
@@ -169,7 +173,8 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
     """Number of tones up to a position one cell below or above each starting point, in the shape of `starts`.
 
     With `reach` 1, tones up to and including one cell above the starting point are counted. With `reach` -1, tones
-    more than one cell below it are counted. Both arrays are sorted.
+    more than one cell below it are counted. `frequencies` (tones, cases) are the cycles per aperture of the tones,
+    and `starts` (points, cases) are positions in cells. Both arrays are sorted.
     """
     ends = starts + reach
     both = (frequencies, ends) if reach > 0 else (ends, frequencies)
@@ -181,7 +186,7 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 
 
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
-    """Height and position of the highest echo, by a search in steps around each starting point."""
+    """Height and position of the highest echo, by a search in steps around each starting point, (cases,) each."""
     best = starts
     for step in _SEARCH_STEPS_CELLS:
         tried = best + step * _REACH
@@ -194,16 +199,16 @@ def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Float
 
 
 def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
-    """Height of the sum of all echoes in phase at the positions `x` (…, cases), in cells."""
+    """Sum of the heights of all echoes at the positions `x` (…, cases) in resolution cells, if they are in phase."""
     return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
 # ---------------------------------------------------------------------- along the line of sight
 class Line(NamedTuple):
-    """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
+    """Sinusoidal vibration: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
 
-    `per_metre` converts an amplitude in metres to the unit of the sinusoid's row. It is (2πf)² if the file states the
-    acceleration.
+    `per_metre` converts an amplitude in metres to the unit of the vibration's row. It is (2πf)² if the file states
+    the acceleration.
     """
 
     amplitude: PerCase
@@ -214,7 +219,8 @@ class Line(NamedTuple):
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
     """Reduction of the range per metre of a platform's motion along each scene axis, at mid-aperture. [m/m]
 
-    With a direct path it is the reduction of the range less the direct path.
+    With a direct path it is the reduction of the range less the direct path. `geometry` is the mission's own if
+    omitted.
     """
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     return sights[PLATFORMS.index(name)]
@@ -223,11 +229,12 @@ def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[PerCase]:
-    """Range error per metre of a platform's vibration along each axis of its errors, as rms over the aperture. [m/m]
+    """Range error per metre of a platform's vibration along each of its axes, as rms over the aperture. [m/m]
 
     The line of sight turns over the aperture. The rms is an upper bound for the height of every echo, and gives the
-    spread. A vibration that is stated by a single value (`is_vector` false) is along the line of sight. It is
-    completely a range error, but with a direct path only a part of it is an error of the range less the direct path.
+    spread. If `is_vector` is true, the axes are those of the frame of the platform's motion error. If it is false,
+    the file states a single value along the line of sight, and the result has a single item. All of such a vibration
+    is range error, but with a direct path only a part of it is an error of the range less the direct path.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
@@ -256,9 +263,9 @@ def counted(
 ) -> PerCase:
     """Amplitude or rms of a platform's vibration along the line of sight. [m]
 
-    `metric` is `pslr` for an amplitude and `islr` for an rms. `value` is given along the line of sight, or along
-    three axes. [m] The projections follow from `seen_of_axes`. Projected amplitudes add, because the axes may vibrate
-    in any phase. Rms values are independent, so their squares add.
+    `metric` is `pslr` for an amplitude and `islr` for an rms. `value` is a single value along the line of sight, or
+    three values along the axes of the platform's frame. [m] The projections follow from `seen_of_axes`. Projected
+    amplitudes add, because the axes may vibrate in any phase. Rms values are independent, so their squares add.
     """
     sizes = value if isinstance(value, tuple) else (value,)
     seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
@@ -272,7 +279,7 @@ def counted(
 
 
 def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> list[Line]:
-    """Sinusoids of one platform, projected on the line of sight."""
+    """Sinusoidal vibrations of one platform, projected on the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal
     return [
@@ -282,7 +289,10 @@ def lines_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 
 
 def unit_of_line(mission: Mission, name: str, entry: int) -> str:
-    """Unit of a sinusoid's row: m/s^2 if the file states its acceleration, m otherwise."""
+    """Unit of the row of a sinusoidal vibration: `m/s^2` if the file states its acceleration, `m` otherwise.
+
+    `entry` is the index of the vibration in the file's list.
+    """
     lines = getattr(mission.platforms, name).motion_error.vibration.sinusoidal
     return "m/s^2" if entry < len(lines) and isinstance(lines[entry], AcceleratedSinusoid) else "m"
 
@@ -292,9 +302,9 @@ def projected(
 ) -> tuple[Note, ...]:
     """Note on the component of a vibration along the line of sight; empty if the vibration is stated along it.
 
-    With a direct path there is a note for every vibration, which gives the component in the range less the direct
-    path. For a slow vibration (`is_slow`) the note gives the component along the line of sight that has the same
-    effect.
+    `value` is the stated amplitude or rms, and `along` is the component. [m] With a direct path there is a note for
+    every vibration, which gives the component in the range less the direct path. For a slow vibration (`is_slow`) the
+    note gives the amplitude along the line of sight that would have the same effect.
     """
     says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
@@ -309,31 +319,33 @@ def projected(
 
 # ---------------------------------------------------------------------- below one cycle per aperture
 def quadratic_part(cycles: PerCase) -> PerCase:
-    """Ratio 7.5·j₂(π·cycles) of the worst quadratic phase of a sinusoid at the aperture edge to its peak phase.
+    """Ratio of a sinusoid's worst quadratic phase at the aperture edge to its peak phase, 7.5·j₂(π·cycles).
 
-    It is the least-squares quadratic of cos(πnx) over the aperture, with n cycles. For small n it is the Taylor term
-    (πn)²/2.
+    `cycles` is the number n of cycles per aperture. The quadratic phase is the least-squares quadratic of cos(πnx)
+    over the aperture. For small n the ratio is the Taylor term (πn)²/2.
     """
     phase: PerCase = np.abs(tone(math.pi * cycles)[0])
     return phase
 
 
 def cubic_part(cycles: PerCase) -> PerCase:
-    """Ratio 17.5·j₃(π·cycles) of the worst cubic phase of a sinusoid at the aperture edge to its peak phase.
+    """Ratio of a sinusoid's worst cubic phase at the aperture edge to its peak phase, 17.5·j₃(π·cycles).
 
-    It is the least-squares cubic of sin(πnx) over the aperture, with n cycles.
+    `cycles` is the number n of cycles per aperture. The cubic phase is the least-squares cubic of sin(πnx) over the
+    aperture.
     """
     phase: PerCase = np.abs(tone(math.pi * cycles)[1])
     return phase
 
 
 class DeclaredPhase(NamedTuple):
-    """Quadratic and cubic phase of one declared error, as used in sums. [rad]
+    """Quadratic and cubic phase due to one declared error, as used in sums. [rad]
 
-    `cubic_rad` is None for a pure quadratic phase. `is_there` marks the cases in which a vibration is slow; in all
-    other cases its phases are 0. `coverage` is the coverage factor that both phases include. `hidden_rad` is the
-    quadratic phase equivalent to the loss that band and turn of the line of sight do not resolve. It is added to the
-    quadratic phase as a root-sum-square. [rad]
+    `cubic_rad` is None for a pure quadratic phase. `coverage` is the coverage factor that both phases include.
+    `is_there` marks the cases in which a vibration is slow; in all other cases its phases are 0. `hidden_rad` is the
+    hidden phase: the quadratic phase that lowers the peak as much as the range error that the displacement cannot
+    remove, mainly a constant and a linear part, see `ranges.exact_ranges`. [rad] It is added to the quadratic phase
+    as a root-sum-square.
     """
 
     row_id: str
@@ -345,15 +357,15 @@ class DeclaredPhase(NamedTuple):
     hidden_rad: PerCase = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase magnitude, compared with a limit that includes autofocus gain, see `Declared.judged`. [rad]"""
+        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
     """Yield, for each vibration below one cycle per aperture, its subject and the motion of its platform. [m]
 
-    Along each axis the motion has a cosine and a sine component. A vibration stated along the line of sight moves its
-    platform along the line of sight to the scene centre.
+    Along each axis the motion has a cosine and a sine component. It is 0 in cases in which the vibration is faster. A
+    vibration stated along the line of sight moves its platform along the line of sight to the scene centre.
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
@@ -373,16 +385,16 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 # ---------------------------------------------------------------------- by a spectrum
 def power_of(vibration: Vibration | FeltVibration) -> PerCase:
-    """Factor 10^(L/10) for a spectrum, where L is the `spectrum_level` of the vibration in dB; 1 without a level."""
+    """Factor 10^(L/10) that scales a vibration's spectrum by its `spectrum_level` L in dB; 1 without a level."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
 
 def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
-    """Convert a vibration spectrum to pieces of power laws, multiplied by a power law of frequency.
+    """Convert a vibration spectrum, multiplied by a power law of frequency, to power-law pieces.
 
     `law` is the pair (factor, slope) of the power law factor·f^(−slope), which multiplies the spectrum of
-    acceleration. [(m/s²)²/Hz] A spectrum of displacement is first converted to that of acceleration, which is (2πf)⁴
-    times as large. The spectrum must consist of plain numbers.
+    acceleration. [(m/s²)²/Hz] A spectrum of displacement is first converted to a spectrum of acceleration, which is
+    (2πf)⁴ times as large. The spectrum must consist of plain numbers.
     """
     factor, slope = law
     if not spectrum.is_accelerated:
@@ -403,7 +415,10 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
 
 
 def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) -> float:
-    """Mean density of the power law f^(−slope) between two frequencies [Hz], given its densities at both."""
+    """Mean density of a power law f^(−slope) from the frequency `low` to `high`. [Hz]
+
+    `at_low` and `at_high` are the densities at both ends.
+    """
     return (at_high * high - at_low * low) / ((1 - slope) * (high - low))
 
 
@@ -414,11 +429,12 @@ def spectrum_parts(
     interval: float | None = None,
     delay: PerCase | None = None,
 ) -> Parts:
-    """Parts over the aperture of a vibration spectrum multiplied by a power law, (cases,) each.
+    """Mean squares of the parts over the aperture of a motion or phase due to a vibration spectrum, (cases,) each.
 
-    `law` is described in `spectrum_pieces`. With an `interval` of exchanged pulses [s], the parts are those that
-    remain after synchronization. With a `delay` [s], they are the parts of the difference between the phase at two
-    moments that are this time apart. Densities, intervals and delays may differ from case to case.
+    The power law `law` converts the vibration spectrum to the spectrum of the motion or phase, see `spectrum_pieces`.
+    With an `interval` of exchanged pulses [s], the parts describe the phase that remains after synchronization. With
+    a `delay` [s], they describe the change of the phase over this delay. Densities, intervals and delays may differ
+    from case to case.
     """
     total = np.zeros((len(Parts._fields), seen.cases))
     for (of_group, exchanged), cases in seen.alike((spectrum, interval)):
@@ -432,9 +448,10 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the error of a platform's vibration that the file states by a spectrum; nothing without a spectrum.
+    """Yield the random error of a vibration that the file states by a spectrum; nothing without a spectrum.
 
-    As for noise of an oscillator, the unit is dB, and the declared size is an amplitude factor of 1.
+    `name` is the name of the vibrating platform. As for noise of an oscillator, the unit is dB, and the declared size
+    is an amplitude factor of 1.
     """
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
@@ -458,13 +475,19 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
-    """Rms displacement of a vibration spectrum over all its frequencies. [m]"""
+    """Rms displacement of a vibration over all frequencies of its spectrum. [m]
+
+    `power` is a factor that multiplies the spectrum.
+    """
     pieces = spectrum_pieces(spectrum, DISPLACED)
     return math.sqrt(power * math.fsum(piece.integral(piece.low, piece.high) for piece in pieces))
 
 
 def pieces_of_vibration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """One-way phase spectrum of a platform's vibration along the line of sight. [rad²/Hz]"""
+    """One-way phase spectrum of a platform's vibration along the line of sight, as power-law pieces. [rad²/Hz]
+
+    `name` is the name of the platform. The file must state the vibration by a spectrum.
+    """
     vibration = getattr(mission.platforms, name).motion_error.vibration
     k = 2 * math.pi / mission.radar.wavelength * float(counted(mission, name, 1.0, "islr"))
     factor, slope = DISPLACED

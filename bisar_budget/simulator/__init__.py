@@ -1,4 +1,7 @@
-"""Simulated images of point scatterers with motion errors, formed from exact ranges. The package needs NumPy."""
+"""Simulation of bistatic SAR images of point scatterers with motion, clock and atmosphere errors.
+
+The data are computed from exact ranges. The package needs NumPy.
+"""
 
 # Modules that other packages may import.
 __all__ = [

@@ -1,4 +1,4 @@
-"""Autofocus of a complex image by phase gradient or map drift, and the rotation that a bistatic image needs for it.
+"""Autofocus of a complex image by phase gradient or map drift, and rotation of a bistatic image before and after it.
 
 Motion errors smear an image along y′, across the bistatic look direction. Both estimators therefore take an image in
 the rotated frame (x′, y′), with x′ along the first axis. An image in (x, y) is first rotated to that frame and later
@@ -40,27 +40,29 @@ class PhaseGradientSettings:
     max_lines : int
         Largest number of range lines that are used. More lines take more time and improve the estimate little.
     target_count, targets_per_line : int
-        Largest number of targets in the image, and in one range line.
+        Largest number of targets that are used in the image, and in a range line.
     secondary_fraction : float
         Smallest power of a second or further target, as a fraction of the largest power of its line. Sidelobes are
         weaker.
     false_alarm_probability : float
-        Probability that clutter alone shows a target anywhere in the image.
+        Probability that a target is detected anywhere in an image of clutter alone.
     clutter_floor_ratio : float
         Lower bound of the clutter power of a line, as a ratio to the peak power of the image. Lower powers come from
         rounding, not from clutter.
     smear_fraction : float
-        Level at which the mean response is considered to end, as a fraction of its peak.
+        Power at which the mean response is considered to end, as a fraction of its peak. Both powers are measured
+        above the median.
     shrink_factor : float
-        Smallest ratio of the window widths of an iteration and of the iteration before.
+        Smallest ratio of the window width of an iteration to that of the previous iteration.
     narrowest_cells : int
-        Half width of the last window. [cells]
+        Smallest half width of a window. [cells]
     bridge_cells : int
-        Widest gap in the mean response that is bridged. Nulls within a smeared response are narrower. [cells]
+        Width up to which a gap next to the peak of the mean response is bridged. [cells] Half the distance of the
+        gap from the peak is added. Nulls within a smeared response are narrower.
     coherent_rad : float
         RMS phase below which responses can be added coherently over the full aperture. [rad]
     significant_sigma : float
-        Smallest component of a step that is kept, in standard deviations of the components that clutter alone gives.
+        Smallest phase component that an iteration keeps, in standard deviations of components from clutter alone.
     """
 
     max_lines: int = 96
@@ -82,10 +84,11 @@ _PGA = PhaseGradientSettings()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Focused:
-    """Image after autofocus, and the phase that was removed from its spectrum along the second axis. [rad]
+    """Image after autofocus, and the phase [rad] that autofocus removed from its spectrum along the second axis.
 
-    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`. It is 0 outside the band of the aperture. It has no
-    constant or linear part over the band, because these do not defocus: a linear phase only displaces.
+    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`; `autofocus_in_scene_axes` returns a different length.
+    It is 0 outside the band of the aperture. It has no constant and no linear part over the band, because these
+    parts do not defocus: a linear phase only displaces.
     """
 
     image: Complexes
@@ -98,8 +101,9 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
     Targets stronger than clutter are selected, centred to a fraction of a sample, windowed, and transformed to the
     aperture. While they are smeared, the gradient kernel estimates their common phase. Once they can be added
     coherently, the phase is estimated from the principal eigenvector of their covariance, by power iteration. The
-    phase only has components that vary slowly enough for the window. Components of a step that are as small as those
-    from clutter alone are dropped. The iteration ends when no component is left.
+    phase only has components that vary slowly enough for the window. Each iteration estimates the remaining phase,
+    and drops the components that are as small as components from clutter alone. The iteration ends when all
+    components are dropped.
 
     Parameters
     ----------
@@ -119,11 +123,13 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
     Notes
     -----
-    A smeared target must exceed the clutter: its power, divided by the cells it is smeared over, must exceed the
-    mean clutter power by ln(pixels / 10⁻³), 13 dB in a million pixels. The remaining error follows from the clutter:
-    about √(window / (2 · targets · ratio)) rad rms, for a window of ±12 cells and a ratio of target power to clutter
-    power. Targets in each other's windows add 0.1 to 0.3 rad if there are no more than a dozen in all. Where a taper
-    falls below a tenth of its maximum (Taylor -45 dB), the phase is not corrected.
+    A smeared target must exceed the clutter. Its power, divided by the number of cells over which it is smeared, must
+    exceed the mean clutter power by a factor of ln(pixels / 10⁻³). In a million pixels this factor is 13 dB.
+
+    Clutter causes an error of the estimated phase of about √(window / (2 · targets · ratio)) rad rms. Here the window
+    is ±12 cells, and the ratio is that of target power to clutter power. If an image has no more than a dozen
+    targets, targets in each other's windows add 0.1 to 0.3 rad. Where a taper falls below a tenth of its maximum, as
+    a Taylor taper of -45 dB does, the phase is not corrected.
     """
     image = _checked(image)
     rows, level = _range_lines(image)
@@ -139,11 +145,11 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
 
 def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
-    """Estimate a quadratic, or quadratic and cubic, phase error from the drift between sub-aperture images.
+    """Estimate and remove a quadratic, or quadratic and cubic, phase error by shifts between sub-aperture images.
 
-    The phase error over a sub-aperture is mainly linear, which shifts the image of the sub-aperture. The
-    cross-correlation of the images' powers along y′, summed over range lines, measures the shifts. The estimate is
-    repeated until the images no longer drift.
+    The phase error over a sub-aperture is mainly linear, which shifts the image of the sub-aperture along y′. The
+    shifts are measured by the cross-correlation of the powers of two images along y′, summed over range lines. The
+    estimate is repeated until the images are no longer shifted against each other.
 
     Parameters
     ----------
@@ -165,9 +171,9 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
     Notes
     -----
     Map drift needs features that all sub-aperture images show: points, edges, texture. Speckle of disjoint
-    sub-apertures is independent, so a homogeneous scene gives no estimate. Phase errors of higher orders than the
-    estimated ones remain in the image and bias the estimate: with two sub-apertures a cubic phase has no effect on
-    the estimate, and a quartic phase is partly counted as quadratic. The smear must be much narrower than the image,
+    sub-apertures is independent, so a homogeneous scene gives no estimate. Phase errors of orders above the estimated
+    orders remain in the image and may bias the estimate. With two sub-apertures a cubic phase does not change the
+    estimate, but a quartic phase is partly counted as quadratic. The smear must be much narrower than the image,
     because the correlation is circular.
     """
     if sub_apertures not in (2, 3):
@@ -210,15 +216,15 @@ ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
 def autofocus_in_scene_axes(
     image: Complexes, look_azimuth: float, algorithm: Callable[[Complexes], Focused] = phase_gradient_autofocus
 ) -> Focused:
-    """Rotate an image in (x, y) to (x′, y′), focus it there, and rotate it back: Section VI of the paper.
+    """Rotate an image from (x, y) to (x′, y′), focus it there, and rotate it back: Section VI of Rigling & Moses.
 
     Parameters
     ----------
     image : (n, n) ndarray
         Complex image on a square ground grid of equal spacing along x (first axis) and y, as from `ground_grid` with
-        azimuth 0, centred on its sample n // 2. The image must be at baseband: with the phase of the range to each
-        pixel in it, it would have a carrier beyond the sampling band. It must be sampled at least 1.42 times finer
-        than the band requires, because the band rotates with the image.
+        azimuth 0, centred on its sample n // 2. The image must be at baseband. If it still has the phase of the range
+        to each pixel, it has a carrier beyond the sampling band. It must be sampled at least 1.42 times finer than
+        the band requires, because the band rotates with the image.
     look_azimuth : float
         φ_b, (11): direction of x′. [rad]
     algorithm : callable
@@ -227,13 +233,14 @@ def autofocus_in_scene_axes(
     Returns
     -------
     Focused
-        `image` is in (x, y), (n, n). `phase` is along y′ for m frequencies of the same sampling interval, (m,). The
-        phase is estimated in the largest rotated square within the image, which has m samples on a side.
+        `image` is in (x, y), (n, n). `phase` (m,) is along y′, in the order of `numpy.fft.fftfreq(m)`. It is
+        estimated in the largest square along x′ and y′ within the image. This square has m samples of the same
+        spacing on a side.
 
     Raises
     ------
     ValueError
-        The image is not square, the azimuth is not finite, or `algorithm` raises it.
+        The image is not square, the azimuth is not finite, or `algorithm` raises a `ValueError`.
     """
     image = _checked(image)
     turned = rotated(image, look_azimuth)
@@ -249,8 +256,9 @@ def autofocus_in_scene_axes(
 def aperture_band(spectrum: Complexes) -> Indices:
     """Indices of the frequencies that the aperture fills in a spectrum (lines, frequencies), in ascending frequency.
 
-    The spectrum is in the order of the FFT, and the filled band may wrap around its ends. If no empty gap is wide
-    enough, the aperture fills the whole spectrum, and the indices begin at the most negative frequency.
+    The spectrum is in the order of the FFT, and the filled band may wrap around its ends. Frequencies with less than
+    a tenth of the largest amplitude count as empty. If no empty gap is wider than 5 % of the spectrum, the aperture
+    fills the whole spectrum. The indices then begin at the most negative frequency.
     """
     count = spectrum.shape[1]
     strength = np.sqrt(np.mean(np.abs(spectrum) ** 2, axis=0))
@@ -285,21 +293,24 @@ def _corrected(image: Complexes, phase: Floats) -> Complexes:
 
 
 def _aperture_places(count: int) -> Floats:
-    """Positions of `count` aperture samples between -1 and 1, at the centres of equal cells."""
+    """Normalised aperture positions of `count` samples: the centres of equal cells between -1 and 1, (count,)."""
     return (2 * np.arange(count) - (count - 1)) / count
 
 
 def _threshold(pixels: int) -> float:
-    """Ratio of a pixel's power to the mean clutter power above which a pixel counts as a target.
+    """Ratio of a pixel's power to the mean clutter power above which the pixel counts as a target.
 
-    In an image of `pixels` pixels of exponentially distributed clutter, any pixel exceeds it with the false-alarm
-    probability.
+    In an image of `pixels` pixels of clutter alone, whose power is exponentially distributed, the probability that
+    any pixel exceeds the threshold is the false-alarm probability.
     """
     return math.log(pixels / _PGA.false_alarm_probability)
 
 
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
-    """Indices of the range lines that contain a target, strongest first, and the mean clutter power of each."""
+    """Indices of the range lines that contain a target, and the mean clutter power of each line, (lines,) each.
+
+    The line with the largest ratio of peak power to clutter power is first. Both arrays are empty without a target.
+    """
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
     if not peak.max():
@@ -314,9 +325,10 @@ def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
 
 
 def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
-    """Estimate the phase over the band that is common to all range lines, by phase gradient autofocus. [rad]
+    """Estimate the phase over the band that is common to all range lines, by phase gradients, (count,). [rad]
 
-    `aperture` is the spectrum of range lines that are scaled to a clutter power of 1. The result is (count,).
+    `aperture` (lines, count) is the spectrum of range lines within the band, scaled to a clutter power of 1. A range
+    line is computed from it with `line_samples` samples. Pixels with a power above `threshold` count as targets.
     """
     count = aperture.shape[1]
     per_cell = line_samples / count
@@ -349,7 +361,11 @@ def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> F
 
 
 def _smear(power: Floats, per_cell: float) -> int:
-    """Half width of the mean response around the peak of each line, with both sides folded. [samples]"""
+    """Half width of the mean response of range lines, aligned at their peaks. [samples]
+
+    At each distance from the peak, the stronger side of a line is averaged. `power` is (lines, samples), and
+    `per_cell` is the number of samples per resolution cell.
+    """
     samples = power.shape[1]
     column = power.argmax(axis=1)[:, None]
     distance = np.arange(samples // 2)
@@ -367,7 +383,11 @@ def _smear(power: Floats, per_cell: float) -> int:
 
 
 def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indices]:
-    """Rows and columns of targets: the strongest pixel of each line, and further strong pixels outside its window."""
+    """Rows and columns of targets: the strongest pixel of each line, and further strong pixels, (targets,) each.
+
+    `power` is (lines, samples), in units of the clutter power. A further pixel is more than 2 · `half` samples from
+    all stronger targets of its line. Its power exceeds `threshold` and a fraction of the largest power of its line.
+    """
     remaining = power.copy()
     row = np.arange(power.shape[0])
     least_power = _PGA.secondary_fraction * power.max(axis=1)
@@ -388,9 +408,11 @@ def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indic
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
     """Shift the interpolated peak of each response to sample 0, by a phase ramp over the aperture.
 
-    If the window were off the peak by a fraction of a sample, it would bend the phase at the edges of the aperture.
-    This would happen in the same direction in each iteration, and the estimate would drift. Newton's method on the
-    power finds the interpolated peak.
+    `aperture` (targets, count) are the spectra of the responses. `column` (targets,) is the strongest sample of each
+    response, in a line of `samples` samples. Newton's method on the power finds the interpolated peak.
+
+    A window that is off the peak by a fraction of a sample bends the phase at the edges of the aperture. Because the
+    bend has the same direction in each iteration, the estimate would drift without this shift.
     """
     count = aperture.shape[1]
     turn = 2 * math.pi / samples
@@ -408,9 +430,9 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
 
 
 def _phasors(angle: Floats, count: int) -> Complexes:
-    """Phasors exp(j · angle · n) for n = 0 … count - 1, (angles, count).
+    """Phasors exp(j · angle · n) of several angles for n = 0 … count - 1, (angles, count).
 
-    They are computed as products of coarse and fine steps, which needs only a few exponentials.
+    They are products of coarse and fine phasors, so that only a few exponentials are computed.
     """
     fine = np.exp(1j * np.outer(angle, np.arange(32)))
     coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
@@ -419,11 +441,12 @@ def _phasors(angle: Floats, count: int) -> Complexes:
 
 
 def _basis(strength: Floats, order: int) -> Floats:
-    """Smooth functions over the aperture, (count, functions): a cubic polynomial, then cosines of rising frequency.
+    """Smooth basis functions of a phase error, (count, functions): polynomials up to the cubic, then cosines.
 
-    They are orthonormal with the power over the aperture as weight. The polynomial takes up the slopes at both ends,
-    so that the series of cosines of a smooth phase converges fast. The n-th cosine makes n/2 cycles over the
-    aperture. Samples outside the band have no weight; in an image of finite extent the response leaks into them.
+    They are orthonormal with the power over the aperture, `strength` (count,), as weight. Their number is `order`, at
+    most count // 2. The polynomials contain the slopes at both ends, so that the cosine series of a smooth phase
+    converges fast. The n-th cosine completes n/2 cycles over the aperture. Weak samples, into which the response
+    leaks in an image of finite extent, have little weight.
     """
     aperture_place = _aperture_places(strength.size)
     columns = [aperture_place**power for power in range(4)]
@@ -435,7 +458,12 @@ def _basis(strength: Floats, order: int) -> Floats:
 
 
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
-    """Estimate the common phase over the aperture from windowed and centred responses, (count,). [rad]"""
+    """Estimate the phase error over the aperture that is common to windowed and centred responses, (count,). [rad]
+
+    `responses` (targets, count) are their spectra. `samples` is the number of samples of a range line. A large phase
+    is estimated by the gradient kernel alone. A small phase is refined by the principal eigenvector, without the
+    components that are not significant.
+    """
     count = responses.shape[1]
     # Gradient kernel: the maximum-likelihood phase difference of neighbours, integrated.
     difference = np.sum(responses[:, 1:] * responses[:, :-1].conj(), axis=0)
@@ -465,9 +493,10 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
 
 
 def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
-    """Differences of the phase slope between pairs of sub-apertures, (pairs,). [rad] per aperture sample
+    """Phase slope over the second sub-aperture of each pair minus that over the first, (pairs,). [rad/sample]
 
-    None if the images of the sub-apertures do not correlate.
+    `aperture` is (lines, samples), and each of `segments` holds the indices of the samples of a sub-aperture. The
+    result is None if the images of a pair do not correlate.
     """
     samples = 2 * aperture.shape[1]  # the power of an image has twice its bandwidth
     powers = [
@@ -509,8 +538,8 @@ def rotated(image: Complexes, look_azimuth: float) -> Complexes:
     ----------
     image : (n, n) ndarray
         Baseband image with x along the first axis and equal spacing of both axes. It is rotated about sample n // 2
-        of each axis. The result is exact if its spectrum lies within 0.35 cycles per sample of zero. Beyond that, the
-        shears alias.
+        of each axis. The result is exact if the spectrum of the image lies within ±0.35 cycles per sample. The
+        shears alias if the spectrum is wider.
     look_azimuth : float
         Direction of x′. [rad]
 
@@ -542,7 +571,10 @@ def scene_axes(image: Complexes, look_azimuth: float, count: int) -> Complexes:
 
 
 def _turned(image: Complexes, angle_rad: float) -> Complexes:
-    """Rotate an image by an angle: exact quarter turns first, then shears for the remaining angle of at most 45°."""
+    """Rotate a square image to axes turned by an angle: exact quarter turns, then shears for the remaining angle.
+
+    The remaining angle is at most 45°. A `ValueError` is raised if the angle is not finite.
+    """
     if not math.isfinite(angle_rad):
         raise ValueError(f"the look azimuth must be a finite angle (got {angle_rad} rad)")
     quarters = round(angle_rad / (math.pi / 2))
@@ -557,7 +589,10 @@ def _turned(image: Complexes, angle_rad: float) -> Complexes:
 
 
 def _sheared(image: Complexes, shear: float, axis: int) -> Complexes:
-    """Shear an image: new(u, v) = old(u + shear · v, v), with u along `axis`."""
+    """Shear a square image by FFT: new(u, v) = old(u + shear · v, v), with u along `axis`.
+
+    v is counted from the middle sample of the other axis.
+    """
     side = image.shape[0]
     frequency = np.fft.fftfreq(side)
     across = np.arange(side) - side // 2

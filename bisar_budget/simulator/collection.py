@@ -1,4 +1,4 @@
-"""Simulated collection of a mission with arbitrary errors, and images of a point near its displaced position."""
+"""Simulation of a mission's data collection with errors, and of the image around a displaced point."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -63,15 +63,15 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 class RangeLines:
     """Grid of ground pixels along lines of equal range and of equal Doppler.
 
-    On this grid a response is the product of its two cuts. On a straight grid this does not hold if a platform is
-    near, because the ridge of the response then follows an ellipse, and the range sidelobes follow lines of equal
-    Doppler. Here the pixels of a line have the same range sum at the aperture midpoint, and the pixels of a column
-    have the same change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch
-    may bend around a platform.
+    On this grid a response is the product of its two cuts. On a straight grid it is not if a platform is near. The
+    cross-range cut of the response then follows an ellipse, and the range sidelobes follow lines of equal Doppler.
+    Here the pixels of a line have the same range sum at the aperture midpoint, and the pixels of a column have the
+    same change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend
+    around a platform.
 
-    If the line of sight turns so far that Doppler reverses within the aperture, as on a full circle, the range sums
-    at three times do not determine a point. The pixels then lie along straight lines, and sample the full wave-number
-    support.
+    Doppler may reverse within the aperture if the line of sight turns far, as on a full circle. The range sums at the
+    start, middle and end of the aperture then do not determine a point. The pixels are then along straight lines, and
+    sample the full wave-number support.
 
     `transmitter` and `receiver` are the measured positions at an odd number of times, evenly over the aperture,
     (times, 3). [m]
@@ -81,15 +81,15 @@ class RangeLines:
     receiver: Floats
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """Gradients over the ground of the range sum at mid-aperture, and of its change over the aperture.
+        """Gradients over the ground of the range sum at mid-aperture, and of its change over the aperture. [m/m]
 
-        Points (..., 2) give two arrays (..., 2).
+        Points (..., 2) give two arrays (..., 2), in this order. The change is the last range sum minus the first.
         """
         first, middle, last = self._sums(points)
         return middle, last - first
 
     def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Gradients over the ground of the range sum at the first, middle and last time.
+        """Gradients over the ground of the range sum at the start, middle and end of the aperture. [m/m]
 
         Points (..., 2) give three arrays (..., 2).
         """
@@ -97,7 +97,10 @@ class RangeLines:
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
 
     def _gradients(self, points: Floats, times: slice | NDArray[np.intp]) -> Floats:
-        """Gradients over the ground of the range sum at selected times; points (..., 2) give (..., times, 2)."""
+        """Gradients over the ground of the range sum at selected times. [m/m]
+
+        `times` are indices of times of the paths. Points (..., 2) give (..., times, 2).
+        """
         sums: Floats = np.zeros(1)
         for platform in (self.transmitter[times], self.receiver[times]):
             ground = points[..., None, :] - platform[:, :2]
@@ -114,10 +117,10 @@ class RangeLines:
 
     @staticmethod
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
-        """Step along the line of equal Doppler per metre of increase of the range sum, (..., 2). [m/m]
+        """Ground vector along the line of equal Doppler that increases the range sum by one metre, (..., 2). [m/m]
 
-        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If this step would be too long,
-        the step is perpendicular to the lines of equal range instead.
+        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If this vector would be too
+        long, the result is perpendicular to the lines of equal range instead.
         """
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
@@ -126,27 +129,30 @@ class RangeLines:
         return step
 
     def range_sum(self, points: Floats) -> Floats:
-        """Range sum of ground points (..., 2 or 3) at the midpoint, (...). [m]"""
+        """Range sum of ground points (..., 2 or 3) at mid-aperture, (...). [m]"""
         return self._range_sum(points, [len(self.transmitter) // 2])
 
     def carrier(self, points: Floats) -> Floats:
-        """Range sum whose phase is removed from images, for points (..., 2 or 3), (...). [m]
+        """Compute the range sum whose phase is removed from images, for ground points (..., 2 or 3), (...). [m]
 
-        It is the range sum at the midpoint, or its mean over time if Doppler reverses within the aperture.
+        It is the range sum at mid-aperture, or its mean over time if Doppler reverses within the aperture.
         """
         return self._range_sum(
             points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
         )
 
     def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
-        """Mean over selected times of the range sum of ground points (..., 2 or 3), (...). [m]"""
+        """Mean of the range sum of ground points (..., 2 or 3) over selected indices of time, (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
         for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
             total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
         return total / len(times)
 
     def turns_left(self, centre: GroundVector) -> bool:
-        """Whether the range sum increases over the aperture for points counter-clockwise of a ground point."""
+        """Whether the change of the range sum over the aperture increases along y′ at a ground point.
+
+        The axis y′ is 90° counter-clockwise of the direction to the platforms.
+        """
         by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
         return float(by_doppler @ _left(by_range)) < 0
 
@@ -157,9 +163,10 @@ class RangeLines:
         return np.stack((towards, _left(towards)), axis=1)
 
     def cells(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Resolution at a ground point across and along the lines of equal range: from peak to first null. [m]
+        """Resolution at a ground point, from peak to first null, across and along the lines of equal range. [m]
 
-        If Doppler reverses within the aperture, the cells are those that sample the wave-number support.
+        If Doppler reverses within the aperture, the result is the pixel spacing that samples the full wave-number
+        support. A `ValueError` is raised if range or Doppler does not change over the ground at the point.
         """
         ground_point = np.asarray(centre, dtype=float)
         if self.turns_back:
@@ -173,10 +180,11 @@ class RangeLines:
         return float(SPEED_OF_LIGHT_MPS / (radar.bandwidth * steepness)), float(wavelength / (area / steepness))
 
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Cell sizes that pixels must sample: those of `cells`, or smaller across the lines of equal range. [m]
+        """Cell sizes that set the pixel spacing, across and along the lines of equal range. [m]
 
-        Over a long aperture near a platform the wavefronts are so curved that a point is out of focus even at pixels
-        of its column less than a cell away. The spectrum along the column is then wider than the bandwidth.
+        They are the results of `cells`, or smaller across the lines of equal range. Over a long aperture near a
+        platform the wavefronts are strongly curved. A point is then out of focus even at pixels of its column less
+        than a cell away, and the spectrum along the column is wider than the bandwidth.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -189,9 +197,10 @@ class RangeLines:
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
-        """Distances of ground points from a centre along x′ and y′, in resolution cells; points (n, 2) give (n, 2).
+        """Signed distances of ground points (n, 2) from a centre along x′ and y′, in resolution cells, (n, 2).
 
-        They are computed from the range sum at mid-aperture and from its change over the aperture.
+        They are computed from the range sum at mid-aperture and from its change over the aperture. If Doppler
+        reverses within the aperture, they are computed along straight axes.
         """
         if self.turns_back:
             return np.asarray(
@@ -204,17 +213,18 @@ class RangeLines:
         return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT_MPS
 
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
-        """Phasor that removes the phase of the `carrier` range from an image at points (..., 3).
+        """Phasor that removes the phase of the `carrier` range from an image at points (..., 3), (...).
 
-        The image keeps the spectrum of the aperture. A backprojected image has the phase of the range to each pixel.
-        Close to a platform this phase is a chirp across the patch, which hides the aperture from autofocus.
+        A backprojected image has the phase of the range to each pixel. Close to a platform this phase is a chirp
+        across the patch, which hides the spectrum of the aperture from autofocus. The spectrum remains when the phase
+        is removed.
         """
         carrier_range = self.carrier(points) - self.carrier(np.zeros(2))
         phase: Complexes = np.exp(-2j * math.pi / wavelength_m * carrier_range)
         return phase
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels of a patch around a ground point, along lines of equal range and of equal Doppler.
+        """Positions of the pixels of a patch around a ground point, along lines of equal range and of equal Doppler.
 
         Parameters
         ----------
@@ -223,8 +233,8 @@ class RangeLines:
         spacing : (2,) float
             Distance of neighbouring pixels at the centre, across the lines of equal range and along them. [m]
         shape : (2,) int
-            Number of lines, in the direction towards the platforms, and number of pixels of a line,
-            counter-clockwise.
+            Number nx of lines, counted towards the platforms, and number ny of pixels of a line, counted
+            counter-clockwise of that direction.
 
         Returns
         -------
@@ -241,11 +251,14 @@ class RangeLines:
         doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
 
         def across(points: Floats) -> Floats:
-            """Step from points to the next line of equal range, along lines of equal Doppler."""
+            """Vectors along lines of equal Doppler from points (..., 2) to the next line of equal range. [m]"""
             return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
-            """Step from points to the next pixel of their line: an equal change of Doppler, up to a longest step."""
+            """Vectors from points (..., 2) to the next pixel of their line of equal range. [m]
+
+            The steps are equal in Doppler. A vector is shortened if it exceeds a maximum length.
+            """
             g, d = self.gradients(points)
             tangent = -_left(g) / np.sqrt(_dot(g, g))
             slope, longest = _dot(d, tangent), _MAX_STRETCH_FACTOR * spacing[1]
@@ -287,7 +300,7 @@ class Chip(NamedTuple):
         return middle
 
     def within(self, cells: int) -> "Chip":
-        """Middle part of the chip, at most `cells` resolution cells wide along y′."""
+        """Crop the chip to the middle `cells` resolution cells along y′; a narrower chip is returned unchanged."""
         columns = 2 * round(cells * OVERSAMPLING_FACTOR / 2)
         start = self.image.shape[1] // 2 - columns // 2
         if start <= 0:
@@ -317,14 +330,14 @@ class PointCollection:
         return SPEED_OF_LIGHT_MPS / self.radar.bandwidth
 
     def window(self, count: int) -> Floats:
-        """Weights of `count` samples over the aperture or over the band, at the centres of equal cells."""
+        """Window weights of `count` samples over the aperture or the band, (count,); all are 1 without a taper."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
-        """Actual and measured paths of both platforms with errors, and the clock errors, at the slow times.
+        """Compute the true and measured paths of both platforms and the clock errors at given slow times.
 
-        If the receiver takes the direct path as its clock, the errors of both paths also cause a clock error. Errors
-        with wideband vibration need the generator `rng`.
+        If the receiver uses the direct signal of the transmitter as its clock, the errors of both paths also cause a
+        clock error. Errors with wideband vibration need the random generator `rng`.
         """
         metre_motions = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
         transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, metre_motions[0])
@@ -350,7 +363,10 @@ class PointCollection:
         frequencies: int,
         **noise: Unpack[ReceiverNoise],
     ) -> PhaseHistory:
-        """Record scatterers (n, 3) at `frequencies` frequencies over the band, weighted by the window."""
+        """Record the phase history of scatterers (n, 3) at `frequencies` frequencies over the band.
+
+        The samples are weighted by the window of the mission, over the aperture and over the band.
+        """
         frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)
         history = flight.record(scatterers, amplitudes, slow_time, frequency, **noise)
         if self.is_tapered:
@@ -358,9 +374,9 @@ class PointCollection:
         return history
 
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
-        """Displacement of a ground point in the image and the phases that remain there, computed from exact ranges.
+        """Compute from exact ranges how errors displace a ground point in the image, and which phase errors remain.
 
-        `seen_from` is the ground point, east and north. [m]
+        `seen_from` is the ground point, east and north. [m] The displacement is relative to it.
 
         Raises
         ------
@@ -399,8 +415,8 @@ class PointCollection:
         cells, range_cells : int
             Extent in resolution cells along y′ and x′. 0 range cells give a single line through the centre.
         is_reference : bool
-            Whether the platforms fly the measured paths, with a perfect clock. The result is the image that the same
-            processor forms without errors.
+            If true, the data are recorded as if the platforms flew the measured paths with a perfect clock. The
+            result is the image that the same processor forms without errors.
 
         Raises
         ------
@@ -425,9 +441,10 @@ class PointCollection:
     def pair(
         self, errors: Errors, ground_point: GroundVector, cells: int = CUT_CELLS, range_cells: int = RANGE_CELLS
     ) -> tuple[Chip, Chip]:
-        """Form an image with errors around the point where the scene centre appears, and its reference image.
+        """Form the image of the scene centre with errors, and a reference image without errors, on the same pixels.
 
-        `ground_point` is this displaced point. The reference image has a scatterer at `ground_point` and no errors.
+        `ground_point` is the displaced point at which the scene centre appears, and the centre of both images. The
+        reference image is that of a scatterer at `ground_point`.
         """
         return (
             self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
@@ -439,7 +456,11 @@ class PointCollection:
     def _grid(
         self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
     ) -> tuple[Floats, tuple[float, float]]:
-        """Pixels of a chip, and their spacing. The last grid is cached, because images are formed in pairs."""
+        """Pixel positions (nx, ny, 3) of a chip, and the spacing of its pixels along x′ and y′. [m]
+
+        The last grid is cached, because images are formed in pairs. A `ValueError` is raised if the patch aliases or
+        is too large.
+        """
         key = (centre, errors.smooth(), cells, range_cells)
         if self._last_grid is None or self._last_grid[0] != key:
             lines = self.range_lines(errors)
@@ -455,7 +476,7 @@ class PointCollection:
         return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """Number of frequencies for which range profiles do not repeat within the patch, including the range walk."""
+        """Number of frequencies with which range profiles, with their range walk, do not repeat within the patch."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, len(flight.clock) // 2, -1):
@@ -470,10 +491,10 @@ class PointCollection:
         return max(_MIN_CHIP_FREQUENCY_COUNT, 16 * math.ceil((cells + _MIN_CHIP_FREQUENCY_COUNT / 2) / 16))
 
     def _require_room(self, cells: int, range_cells: float) -> None:
-        """Raise a `ValueError` if a patch of resolution cells aliases or is too large.
+        """Raise a `ValueError` if a patch aliases, is too large or needs too much memory.
 
-        The memory is checked for the number of pulses that the patch needs, because additional pulses would not
-        change its image.
+        The patch is `cells` resolution cells wide along y′ and `range_cells` along x′. The memory is checked for the
+        number of pulses that the patch needs, because additional pulses would not change its image.
         """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
@@ -498,17 +519,19 @@ class PointCollection:
 
 
 def pulses_for(cells: int) -> int:
-    """Number of pulses for a patch of `cells` resolution cells.
+    """Number of pulses for a patch that is `cells` resolution cells wide in cross-range.
 
-    A large patch needs only half as many pulses per cell, because its aliases are far enough away.
+    A patch of up to 128 cells gets four pulses per cell. A large patch needs only two pulses per cell, because its
+    aliases are far from the response.
     """
     return max(_PULSES_PER_CELL * min(cells, _LARGE_PATCH_CELLS), _PULSES_PER_CELL // 2 * cells)
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
-    """Follow a field of steps from points (..., 2) in both directions.
+    """Follow the curves of a vector field from points `start` (..., 2) in both directions.
 
-    Returns the points along the curves, (count, ..., 2). The start is at index count // 2.
+    `step` gives the vector from a point to the next point of its curve. Returns the points along the curves,
+    (count, ..., 2). The start is at index count // 2.
     """
     back = count // 2
     direction = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
@@ -527,7 +550,7 @@ def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Fl
 
 
 def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
-    """Cubic interpolation between the points a and b, from their slopes per pixel, at fractions t."""
+    """Interpolate between the points a and b by a cubic with given slopes per pixel, at fractions t from 0 to 1."""
     slope_a, slope_b = _GRID_STRIDE_PIXELS * slope_a, _GRID_STRIDE_PIXELS * slope_b
     s = 1 - t
     cubic: Floats = s * s * (1 + 2 * t) * a + t * t * (1 + 2 * s) * b + s * t * (s * slope_a - t * slope_b)
@@ -535,11 +558,11 @@ def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) 
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    """Scalar products of plane vectors, (..., 1)."""
+    """Scalar products of plane vectors (..., 2), (..., 1)."""
     return a[..., :1] * b[..., :1] + a[..., 1:] * b[..., 1:]
 
 
 def _left(vectors: Floats) -> Floats:
-    """Vectors turned by 90° counter-clockwise."""
+    """Turn plane vectors (..., 2) by 90° counter-clockwise."""
     turned: Floats = vectors[..., ::-1] * np.array([-1.0, 1.0])
     return turned

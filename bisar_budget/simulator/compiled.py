@@ -55,7 +55,10 @@ _COUNTS_PER_CYCLE = 2.0**32  # a cycle in 32 bits, so that integer arithmetic dr
 
 
 class Lattice(NamedTuple):
-    """Evenly spaced pixels at origin + i·across + j·along, with vectors (3,) [m]."""
+    """Lattice of evenly spaced pixels at `origin` + i·`across` + j·`along`.
+
+    These three are vectors (3,). [m] `shape` holds the numbers of values of i and of j.
+    """
 
     origin: Floats
     across: Floats
@@ -63,7 +66,7 @@ class Lattice(NamedTuple):
     shape: tuple[int, int]
 
     def disc(self) -> tuple[Floats, float]:
-        """Centre and radius of a disc that contains all pixels, with lines extended to whole segments. [m]"""
+        """Centre (3,) and radius of a disc that contains all pixels, with lines extended to whole segments. [m]"""
         i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
         corners = (i * self.across + j * self.along, i * self.across - j * self.along)
@@ -83,7 +86,7 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     Returns
     -------
     Lattice or None
-        Lattice of points (n, 3) or (nx, ny, 3); None if they are not evenly spaced.
+        Lattice of points (n, 3) or (nx, ny, 3). None if they have another shape, are empty or are not evenly spaced.
     """
     if points.ndim not in (2, 3) or points.size == 0:
         return None
@@ -102,22 +105,24 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
 
 
 def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
-    """Form an image by backprojection, as `image_formation.backprojection` does; all inputs must be finite.
+    """Form an image by compiled backprojection, with the result of `image_formation.backprojection`.
+
+    All inputs must be finite.
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     points : (..., 3) ndarray
-        Positions of the pixels. It is fastest if they are on a lattice. [m]
+        Positions of the pixels. [m] The function is fastest if they are evenly spaced.
     spline : "linear" or "cubic"
-        Spline that interpolates the profiles.
+        Spline that interpolates the range profiles.
 
     Returns
     -------
     (...) ndarray or None
-        Complex image. None if pixels are so few and so far apart in range that refining the profiles between them
-        takes longer than reading the pixels one by one, or more memory than a block has.
+        Complex image. None if the pixels are so few and so far apart in range that refining the profiles between them
+        takes longer than computing each pixel separately, or takes more memory than a block of profiles.
     """
     shape = points.shape[:-1]
     image = np.zeros(shape, dtype=complex)
@@ -157,10 +162,11 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 
 
 def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
-    """Upper bound of the phase of the fifth order, which the expansion of ranges along half a segment omits. [rad]
+    """Upper bound of the fifth-order phase that the expansion of ranges over half a segment neglects. [rad]
 
     The expansion of |r + x·e|/|r| in powers of x/|r| has the coefficients (P_{n-2} - P_n)/(2n - 1), with the Legendre
-    polynomials P_n of the cosine between r and e.
+    polynomials P_n of the cosine between r and the unit vector e. The result is infinite if a platform is so near
+    that the expansion does not converge fast enough.
     """
     centre, radius = lattice.disc()
     half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
@@ -174,9 +180,11 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
 
 
 class _Block(NamedTuple):
-    """Refined profiles of a block of pulses, and the numbers needed to interpolate them.
+    """Refined range profiles of a block of pulses, with the platform positions and constants to interpolate them.
 
-    A sample of a profile is two floats stored in one 64-bit integer.
+    `profiles` is (pulses, samples). A sample is a 64-bit integer that contains the real and the imaginary part in
+    single precision. `transmitter` and `receiver` are the measured positions, (pulses, 3). [m] `reference` is the
+    range sum of the scene centre, (pulses,). [m]
     """
 
     profiles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
@@ -189,17 +197,20 @@ class _Block(NamedTuple):
 
 
 class _Needed(NamedTuple):
-    """Part of each profile that the pixels need: its first sample, (pulses,), and the number of samples."""
+    """Part of each range profile that the pixels need.
+
+    `first` is the index of the first sample of the part, (pulses,). `samples` is the number of samples.
+    """
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     samples: int
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Part of each profile that is needed for pixels between the range sums `nearest` and `farthest`, (pulses,). [m]
+    """Part of each range profile that pixels between the range sums `nearest` and `farthest` need.
 
-    None if this part has too many samples for the number of pixels. A profile is periodic. If more samples are needed
-    than it has, they repeat.
+    Both range sums are (pulses,). [m] `pixels` is the number of pixels. The result is None if the part has too many
+    samples for this number. A profile is periodic, so its samples repeat if more are needed than it has.
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
@@ -215,7 +226,7 @@ def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: in
 
 
 def _reference(history: PhaseHistory) -> Floats:
-    """Range sum of the scene centre at each pulse. [m]"""
+    """Range sum of the scene centre at each pulse, for the measured positions, (pulses,). [m]"""
     total = np.zeros(history.slow_time.size)
     for positions in (history.transmitter, history.receiver):
         total += np.linalg.norm(positions, axis=1)
@@ -223,7 +234,9 @@ def _reference(history: PhaseHistory) -> Floats:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Interpolation kernel over ±_KERNEL_SAMPLES/2 cells: an exponential of a semicircle, 1 at the centre.
+    """Interpolation kernel that refines range profiles: an exponential of a semicircle, 1 at the centre.
+
+    `offset` is the distance from the centre. [samples] The kernel is meant for offsets within ±_KERNEL_SAMPLES/2.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
     'exponential of semicircle' kernel", 2019. The shape parameter is the value that they give for this oversampling.
@@ -233,7 +246,7 @@ def _kernel(offset: Floats) -> Floats:
 
 
 def _kernel_transform(angle: Floats) -> Floats:
-    """Fourier transform of `_kernel` at angular frequencies in radians per cell, by Gauss-Legendre quadrature."""
+    """Fourier transform of `_kernel` at angular frequencies in radians per sample, by Gauss-Legendre quadrature."""
     nodes, weights = np.polynomial.legendre.leggauss(64)
     offset = nodes * _KERNEL_SAMPLES / 2
     transform: Floats = np.cos(np.outer(angle, offset)) @ (weights * _kernel(offset)) * _KERNEL_SAMPLES / 2
@@ -241,10 +254,11 @@ def _kernel_transform(angle: Floats) -> Floats:
 
 
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
-    """Refine the part of each profile that the pixels need, in blocks of as many pulses as fit into a cache.
+    """Yield the refined part of each range profile that the pixels need, in blocks of pulses that fit into a cache.
 
     The part is found from the pixels and not from a sphere around the patch. A resolution cell may be a hundred times
-    longer than wide, and a sphere around such cells would need many more samples.
+    longer than wide, and a sphere around such cells would need many more samples. All blocks share the same memory,
+    so a block must be used before the next is requested.
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
@@ -282,7 +296,11 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
 
 @_parallel
 def _refine(profiles, first, weights, refined):
-    """Interpolate periodic profiles to a finer sampling, with real and imaginary parts alternating in `refined`."""
+    """Interpolate periodic range profiles to a finer sampling, and write the result to `refined`.
+
+    `first` is the index of the first needed sample of each profile. `weights` (taps, positions) are the kernel
+    weights for each finer position between two samples. Real and imaginary parts alternate in `refined`.
+    """
     length, factor = profiles.shape[1], weights.shape[1]
     count = refined.shape[1] // (2 * factor)
     for pulse in prange(profiles.shape[0]):
@@ -313,7 +331,10 @@ _C0, _C1, _C2, _C3, _C4 = (np.float32(c) for c in _COSINE)
 
 @_compiled
 def _phasor(cycles):
-    """Return exp(2πj·cycles) in single precision, as the square of exp(πj·cycles); |cycles| may slightly exceed ½."""
+    """Return the real and the imaginary part of exp(2πj·cycles) in single precision.
+
+    It is computed as the square of exp(πj·cycles). |cycles| may slightly exceed ½.
+    """
     z = cycles * cycles
     sine = cycles * (_S0 + z * (_S1 + z * (_S2 + z * (_S3 + z * _S4))))
     cosine = _C0 + z * (_C1 + z * (_C2 + z * (_C3 + z * _C4)))
@@ -322,10 +343,11 @@ def _phasor(cycles):
 
 @_compiled
 def _expand(middle, platform, along, ranges):
-    """Add the range from one platform to `ranges`, expanded to fourth order along each segment.
+    """Add the range from one platform to `ranges`, expanded to fourth order along each segment of pixels.
 
-    Row 0 of `ranges` is the range at the middle of each segment. [m] Rows 1 to 4 are the coefficients of the powers
-    of the distance from the middle. [m/pixelⁿ]
+    `middle` (3, segments) are the middles of the segments, and `along` is the vector from pixel to pixel. [m] Row 0
+    of `ranges` (5, segments) is the range at the middle. [m] Row n is the coefficient of the n-th power of the
+    distance from the middle, for n from 1 to 4. [m/pixelⁿ]
     """
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
@@ -345,9 +367,12 @@ def _expand(middle, platform, along, ranges):
 
 @_compiled
 def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, order):
-    """Split the ranges of segments into whole and fractional samples, and remove whole cycles.
+    """Split the ranges of segments into whole and fractional profile samples, and into fractions of carrier cycles.
 
-    This is done in double precision.
+    `ranges` are the coefficients of `_expand`. Rows 0 and 1 of `whole_samples` and `fraction` are the sample at the
+    middle of a segment and the samples per pixel. `turn` are the cycles of the orders 0 to 2, as integers in units of
+    2⁻³² cycles without whole cycles. `order` are the cycles of the orders 2 to 4. All are computed in double
+    precision.
     """
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
@@ -366,9 +391,10 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
 
 @_compiled
 def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
-    """Sample before each pixel, distance of the pixel from that sample, and cycles of the carrier at the pixel.
+    """Compute the profile sample before each pixel, the pixel's distance from it, and the cycles of the carrier.
 
-    Cycles up to second order are computed in integers, and higher orders as fractions of a cycle.
+    They are written to `index`, `between` and `cycles`, (segments, pixels) each. The inputs are the results of
+    `_split`. Cycles up to second order are computed in integers, and higher orders in single precision.
     """
     for i in range(between.shape[0]):
         base, step, start, slope = whole_samples[0, i], whole_samples[1, i], fraction[0, i], fraction[1, i]
@@ -388,7 +414,7 @@ def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index,
 
 @_compiled
 def _cubic(v):
-    """Weights of the cubic B-spline for the samples -1, 0, 1, 2 around a position v in 0 … 1."""
+    """Weights of the cubic B-spline for the samples -1, 0, 1 and 2, at a position v between samples 0 and 1."""
     u = _F(1) - v
     w0, w3 = u * u * u * _F(1 / 6), v * v * v * _F(1 / 6)
     w1 = _F(2 / 3) - v * v * (_F(1) - _F(0.5) * v)
@@ -401,7 +427,7 @@ def _cubic(v):
 
 @_compiled
 def _fetch(profile, index, cubic, fetched):
-    """Copy the profile samples that each pixel needs, two or four, to `fetched`."""
+    """Copy the profile samples that each pixel needs to `fetched`: two for a linear spline, four for a cubic."""
     for i in range(index.shape[0]):
         if cubic:
             for j in range(_SEGMENT_LENGTH):
@@ -423,7 +449,10 @@ def _fetch(profile, index, cubic, fetched):
 
 @_compiled
 def _add_taps(taps, between, cycles, cubic, real, imag):
-    """Add the interpolated value of the profile, times the phasor of the carrier, to each pixel."""
+    """Add the interpolated profile value of a pulse, times the phasor of the carrier, to each pixel.
+
+    `taps` are the samples that `_fetch` copied. `real` and `imag` are the parts of the image.
+    """
     for i in range(real.shape[0]):
         if cubic:
             for j in range(_SEGMENT_LENGTH):
@@ -484,7 +513,7 @@ def _add_lattice(
 
 @_compiled
 def _sums(points, transmitter, receiver, reference, sums):
-    """Compute the range sum of each pixel minus the reference range sum of a pulse, into `sums`. [m]"""
+    """Write the range sum of each of `points` (3, n) minus the range sum `reference` of a pulse to `sums`. [m]"""
     tx, ty, tz = transmitter[0], transmitter[1], transmitter[2]
     rx, ry, rz = receiver[0], receiver[1], receiver[2]
     for i in range(sums.shape[0]):
@@ -494,17 +523,18 @@ def _sums(points, transmitter, receiver, reference, sums):
 
 
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
-    """Boxes around runs of successive pixels in each line (nx, ny, 3), oriented from the first to the last pixel.
+    """Boxes around runs of successive pixels of `lines` (lines, pixels, 3), to bound the ranges of the pixels.
 
-    They show quickly which part of a range profile a patch needs. Finding this part from all pixels would take as
-    long as forming an image.
+    A box is oriented along the horizontal direction from the first to the last pixel of its run. Boxes show quickly
+    which part of a range profile a patch needs. Finding this part from all pixels would take as long as forming an
+    image.
 
     Returns
     -------
     centres : (3, m) ndarray
         Centres of the boxes. [m]
     halves : (m, 3, 3) ndarray
-        Half axes of each box, as rows. [m]
+        Half axes of each box: `halves[i, k]` is the vector of the k-th half axis of box i. [m]
     """
     starts = np.arange(0, lines.shape[1], _RUN_LENGTH)
     ends = np.minimum(starts + _RUN_LENGTH, lines.shape[1]) - 1
@@ -527,7 +557,7 @@ def _boxes(lines: Floats) -> tuple[Floats, Floats]:
 
 @_compiled
 def _leg(position, box, centres):
-    """Distance from a platform to the middle of a box [m], and the three components of the unit vector to it.
+    """Distance from a platform to the centre of a box [m], and the three components of the unit vector to the centre.
 
     The unit vector is 0 if the distance is 0.
     """
@@ -539,16 +569,19 @@ def _leg(position, box, centres):
 
 @_compiled
 def _bend(distance, size):
-    """Upper bound of the error of a linear approximation of `distance` for displacements up to `size`. [m]"""
+    """Upper bound of the error of a linearised distance. [m]
+
+    `distance` is the distance to a point, and is linearised for displacements of the point up to `size`. [m]
+    """
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 
 @_parallel
 def _reach(transmitter, receiver, centres, halves):
-    """Lower and upper bound of the range sum over all boxes, at each pulse. [m]
+    """Lower and upper bound of the range sum of all pixels in the boxes, at each pulse, (pulses,) each. [m]
 
-    The range sum is convex. It is therefore nowhere below its tangent at the middle of a box. For each platform it
-    exceeds the tangent by at most `_bend`.
+    `centres` and `halves` are the results of `_boxes`. The range sum is convex, so it is nowhere below its tangent
+    plane at the centre of a box. The range of each platform exceeds its tangent plane by at most `_bend`.
     """
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
@@ -570,7 +603,10 @@ def _reach(transmitter, receiver, centres, halves):
 
 @_compiled
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
-    """Sample before each pixel, distance of the pixel from that sample, and fractional cycles of the carrier."""
+    """Compute the profile sample before each pixel, the pixel's distance from it, and fractions of carrier cycles.
+
+    They are computed from the range sums `sums` [m], and written to `index`, `between` and `turn`.
+    """
     for i in range(index.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             cell = sums[i * _SEGMENT_LENGTH + j] * per_metre - first
@@ -582,7 +618,7 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add the contributions of a block of pulses to scattered pixels, (3, n), each at its exact range."""
+    """Add the contributions of a block of pulses to scattered pixels (3, n), with exact ranges of all pixels."""
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)

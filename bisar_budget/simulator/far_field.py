@@ -1,6 +1,7 @@
-"""Image formation with the plane waves of the far field: the filter (7), (12) and the polar format (13), (14).
+"""Image formation with plane waves (far field): the filter (7), (12) and the polar format (13), (14).
 
-Both methods defocus and displace points away from the scene centre, because of the approximation (5).
+The equations are those of Rigling & Moses. Both methods defocus and displace points that are not at the scene centre,
+because of the approximation (5).
 """
 
 import math
@@ -36,8 +37,8 @@ def far_field_filter(
         Positions of the pixels. [m]
     method : "auto", "direct" or "nufft"
         "direct" computes the sum as in the paper. "nufft" uses finufft (extra `fast`), gives the same values to
-        -120 dB, and is much faster for images. "auto" uses finufft if it is installed, except for points so far apart
-        that its grid would not fit into memory.
+        -120 dB, and is much faster for images. "auto" uses finufft if it is installed, except if the points are so
+        far apart that the grid of finufft would need too much memory.
 
     Returns
     -------
@@ -70,16 +71,16 @@ def far_field_filter(
 
 @cache
 def is_nonuniform() -> bool:
-    """Whether finufft, which computes a non-uniform FFT, is installed."""
+    """Whether finufft, the library for non-uniform FFTs, is installed."""
     return find_spec("finufft") is not None
 
 
 def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: bool) -> Complexes | None:
-    """Sum of (7) by a non-uniform FFT; None if `bounded` and the grid of the FFT would be too large.
+    """Compute the image (7) at points (n, 3) by a non-uniform FFT, (n,); None if the FFT grid would be too large.
 
-    The number of cells of the grid is the size of the box around the points times the size of the box around the
-    wavenumbers. Both boxes have sides along and across the look direction. With other sides, a patch whose resolution
-    cells are kilometres long would need millions of grid cells.
+    The size of the grid is only checked if `bounded` is true. It grows with the area of the box around the points
+    times the area of the box around the wavenumbers. Both boxes have sides along and across the look direction. With
+    other directions, a patch whose resolution cells are kilometres long would need millions of grid cells.
     """
     import finufft
 
@@ -108,7 +109,10 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
 
 
 class PolarFormat(NamedTuple):
-    """Image (nx, ny), and the frequency grid (13) from which it was formed: f′x (Nx,) and f′y (Ny,). [Hz]"""
+    """Image (nx, ny) by the polar format, and the frequency grid (13) from which it was formed.
+
+    `frequency_x` (Nx,) are the frequencies f′x of the grid, and `frequency_y` (Ny,) the frequencies f′y. [Hz]
+    """
 
     image: Complexes
     frequency_x: Floats
@@ -124,9 +128,9 @@ def polar_format(
 ) -> PolarFormat:
     """Form an image by (14): interpolate samples to the rectangular grid (13) of the rotated frame, then use an FFT.
 
-    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. It omits more if
-    the relative bandwidth or the squint is larger. The step of the grid is c/(2·size), so the image repeats with its
-    size.
+    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. It omits a
+    larger part if the relative bandwidth or the squint is larger. The frequency step of the grid is c/(2·size), so
+    the image repeats after its own size.
 
     Parameters
     ----------
@@ -199,18 +203,23 @@ def polar_format(
 
 
 def _grid(low: float, high: float, step: float) -> Floats:
-    """Multiples of a step between two bounds; the FFT of such a grid has no carrier."""
+    """Frequencies between two bounds that are multiples of a step; the array is empty if there are none. [Hz]
+
+    An FFT of samples at these frequencies has no carrier.
+    """
     first, last = math.ceil(low / step), math.floor(high / step)
     return np.arange(first, last + 1, dtype=float) * step
 
 
 def _interpolated(rows: Complexes, positions: Floats) -> Complexes:
-    """Lagrange interpolation of evenly spaced samples; near the ends the stencil stays within the samples.
+    """Interpolate rows of evenly spaced samples at given positions by Lagrange polynomials, (rows, points).
+
+    Near the ends of a row, the stencil stays within the samples.
 
     Parameters
     ----------
     rows : (rows, samples) ndarray
-        Samples, at least about twice as dense as necessary; the scene is then at most half as large as the sampling
+        Samples, at least about twice as dense as necessary. The scene is then at most half as large as the sampling
         allows.
     positions : (rows, points) ndarray
         Positions along the rows. [samples]

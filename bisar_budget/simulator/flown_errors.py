@@ -1,4 +1,4 @@
-"""Conversion of the errors of a mission to the errors that the simulator applies when it forms an image."""
+"""Conversion of the errors of a mission to the path and clock errors that the simulator applies to an image."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ _MOTION_SAMPLES = 513  # of the smooth motion that a registered kind states
 
 
 def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture_time_s: float) -> Errors:
-    """Convert a single error of a given size to the errors that the simulator applies to an image.
+    """Convert a single error of a given size to the path or clock errors that the simulator applies to an image.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
 def flown_together(
     sizes: Iterable[tuple[ErrorSource, float]], geometry: BistaticGeometry, aperture_time_s: float
 ) -> Errors:
-    """Superpose several errors of given sizes, as errors that the simulator applies to an image.
+    """Convert several errors of given sizes to the total errors that the simulator applies to an image.
 
-    `sizes` are pairs of an error and its signed size. The other arguments are those of `flown`.
+    `sizes` are pairs of an error and its signed size. The remaining arguments are those of `flown`.
     """
     return superposed(flown(source, size, geometry, aperture_time_s) for source, size in sizes)

@@ -1,8 +1,9 @@
-"""Image formers with a common interface: their pixels, the position where they show a point, and the baseband image.
+"""Image formers with a common interface: their pixels, the ground point at which they show a target, and the image.
 
-A former by exact ranges, (4), shows a point at the displaced point, and uses pixels along lines of equal range. A
-former by plane waves, (7) to (14), shows a point where plane waves have the recorded range history. It uses straight
-lines of pixels along the axes (x′, y′) of (10). Ground points are given as east and north. [m]
+The image is at baseband. A former by exact ranges, (4), shows a target at its displaced point, and uses pixels along
+lines of equal range. A former by plane waves, (7) to (14), shows a target where plane waves have the recorded range
+history. It uses straight lines of pixels along the axes (x′, y′) of (10). Ground points are given as east and
+north. [m]
 """
 
 import math
@@ -34,7 +35,10 @@ OnPixels = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactRangeFormer:
-    """Image former by exact ranges: matched filter (4), or backprojection, which gives the same image."""
+    """Image former by exact ranges: matched filter (4), or backprojection, which gives the same image.
+
+    `is_direct` selects the matched filter. `kernel` is the kernel of the backprojection.
+    """
 
     lines: RangeLines
     radar: Band
@@ -43,17 +47,20 @@ class ExactRangeFormer:
 
     @property
     def bytes_held(self) -> float:
-        """Memory that forming an image needs in addition to the images and the phase history. [B]"""
+        """Memory that image formation needs besides the images and the phase history. [B]"""
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point at which the image shows a target: for exact ranges, the displaced point itself. [m]"""
+        """Ground point at which the image shows a target, east and north. [m]
+
+        For exact ranges it is the argument `displaced`, the displaced point of the target.
+        """
         return displaced
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
-        """Range history that remains for a target at `ground_point`. [m]
+        """Recorded range history of a target minus the range history that the former assumes for `ground_point`. [m]
 
-        For exact ranges it is the argument `remaining_range`, the range history that remains at the displaced point.
+        For exact ranges it is the argument `remaining_range`, which is this difference at the displaced point.
         """
         return remaining_range
 
@@ -62,16 +69,16 @@ class ExactRangeFormer:
         return self.lines.cells(centre, self.radar)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cell sizes that pixels must sample, at most the resolution. [m]"""
+        """Cell sizes along x′ and y′ that set the pixel spacing; they do not exceed the resolution. [m]"""
         return self.lines.sampled(centre, self.radar)
 
     def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′, a unit vector (2,)."""
+        """Direction of x′ at a ground point, a unit vector (2,) towards the platforms."""
         towards: Floats = self.lines.axes(centre)[:, 0]
         return towards
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Distances of ground points (n, 2) from a centre along x′ and y′, in resolution cells, (n, 2)."""
+        """Signed distances of ground points (n, 2) from a centre along x′ and y′, in resolution cells, (n, 2)."""
         return self.lines.offsets(ground_points, centre, self.radar)
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
@@ -79,7 +86,10 @@ class ExactRangeFormer:
         return self.lines.grid(centre, spacing, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the image at pixels (nx, ny, 3)."""
+        """Form the baseband image at pixels (nx, ny, 3), (nx, ny).
+
+        `on_pixels` is called with the number of pixels of each block that is formed.
+        """
         return _in_blocks(lambda block: self._formed(history, block), grid, on_pixels)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
@@ -99,8 +109,9 @@ class ExactRangeFormer:
 class PlaneWaves:
     """Image former by plane waves: far-field filter (12), or polar format (13) and (14).
 
-    `sight` (times, 2) is the sum of the unit vectors to both measured platforms on the ground, at an odd number of
-    slow times with the aperture midpoint in the middle.
+    `sight` (times, 2) are the ground components of the sum of the unit vectors from the scene centre to both
+    platforms, for the measured paths. Its odd number of slow times has the aperture midpoint in the middle.
+    `is_polar` selects the polar format.
     """
 
     sight: Floats
@@ -111,7 +122,7 @@ class PlaneWaves:
 
     @property
     def middle(self) -> Floats:
-        """Sum of the unit vectors to the platforms at the aperture midpoint, on the ground, (2,)."""
+        """Ground components of the sum of the unit vectors to both platforms at the aperture midpoint, (2,)."""
         towards: Floats = self.sight[len(self.sight) // 2]
         return towards
 
@@ -121,7 +132,11 @@ class PlaneWaves:
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point with the smallest variance of the phase that remains in the plane-wave model (5). [m]"""
+        """Ground point at which the image shows a target, east and north. [m]
+
+        It has the smallest variance of the phase that remains when the range history `recorded` [m] is compared with
+        the plane-wave model (5).
+        """
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
         *sight, error = np.polynomial.legendre.legval(sampling.places, fitted)[..., None]
@@ -130,37 +145,45 @@ class PlaneWaves:
         return float(by_east), float(by_north)
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
-        """Remaining range history at a ground point, including the error of the far-field approximation. [m]"""
+        """Recorded range history of a target minus the plane-wave range history of `ground_point`. [m]
+
+        `recorded` is the range history relative to that of the scene centre. [m] The result includes the error of the
+        far-field approximation.
+        """
         range_history: Floats = recorded + self.sight @ np.asarray(ground_point)
         return range_history
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution along x′ and y′ from the full wave-number support, including the corners of the aperture. [m]"""
+        """Resolution along x′ and y′ for the full wave-number support, including the corners of the aperture. [m]"""
         cosine, sine = math.cos(self.azimuth), math.sin(self.azimuth)
         along, across = cells_of_support(self.sight, np.array([[cosine, -sine], [sine, cosine]]), self)  # (9)
         return float(along), float(across)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cell sizes that pixels must sample: those of the full wave-number support. [m]"""
+        """Cell sizes along x′ and y′ that set the pixel spacing; they are equal to the resolution. [m]"""
         return self.cells(centre)
 
     def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′, a unit vector (2,)."""
+        """Direction of x′, a unit vector (2,) towards the platforms; it is the same at all points."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Distances of ground points (n, 2) from a centre along the axes of (10), in resolution cells, (n, 2)."""
+        """Signed distances of ground points (n, 2) from a centre along x′ and y′ of (10), in resolution cells."""
         cosine, sine = self.look(centre)
         rotated = (ground_points - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
         return np.asarray(rotated / np.array(self.cells(centre)))
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels of a patch along the axes of (10), (nx, ny, 3). [m]"""
+        """Pixels of a patch along the axes x′ and y′ of (10), (nx, ny, 3). [m]"""
         size = (spacing[0] * shape[0], spacing[1] * shape[1])
         return ground_grid(centre, self.azimuth, size, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the image at pixels (nx, ny, 3). The polar format requires pixels that `grid` has returned."""
+        """Form the baseband image at pixels (nx, ny, 3), (nx, ny).
+
+        The polar format requires pixels that `grid` has returned. `on_pixels` is called with the number of pixels of
+        each block that is formed.
+        """
         if not self.is_polar:
             return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)
         nx, ny = grid.shape[:2]
@@ -174,9 +197,10 @@ class PlaneWaves:
         return formed * self._carrier(grid)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """Estimate the time to form an image from the numbers of samples and pixels. [s]
+        """Estimate the time to form an image from `pulses` pulses. [s]
 
-        A Fourier transform uses each of them only a few times.
+        For a Fourier transform it is proportional to the numbers of samples and pixels, because the transform uses
+        each of them only a few times. The far-field filter without finufft is timed in a trial with few pulses.
         """
         if not self.is_polar and not is_nonuniform():
             return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)
@@ -185,7 +209,10 @@ class PlaneWaves:
         return _SECONDS_PER_SAMPLE * float(blocks * pulses * trial_history.frequency.size + pixels)
 
     def _carrier(self, points: Floats) -> Complexes:
-        """Phasor that removes the phase of the plane-wave range at mid-aperture, as `RangeLines.baseband` does."""
+        """Phasor that removes the phase of the plane-wave range at mid-aperture from an image at points (..., 3).
+
+        It corresponds to `RangeLines.baseband`, which uses exact ranges.
+        """
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT_MPS
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
@@ -201,7 +228,11 @@ def _extrapolated(
     grid: Floats,
     trial_count: int,
 ) -> float:
-    """Estimate the time for a full image from the second run of a trial with few pixels and few pulses. [s]"""
+    """Estimate the time to form a full image, from a trial with few pixels and few pulses. [s]
+
+    The second run of the trial is timed, because the first may include compilation. `trial_count` is the largest
+    number of pixels of the trial.
+    """
     trial_pixels = grid[: max(1, trial_count // grid.shape[1]), :trial_count]
     form(trial_history, trial_pixels)
     start_time = time.perf_counter()

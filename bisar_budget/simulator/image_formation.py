@@ -1,4 +1,4 @@
-"""Image formation by the matched filter (4), which is exact, and by backprojection, which is fast.
+"""Image formation by the matched filter (4) of Rigling & Moses, which is exact, and by backprojection, which is fast.
 
 Both use the measured positions, as a processor must. A point scatterer of amplitude A has the peak |A|.
 """
@@ -26,7 +26,10 @@ Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
 
 def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Floats:
-    """Exact differential range ΔR of points (n, 3) at a pulse, for the measured positions, (n,). [m]"""
+    """Exact differential range ΔR of points (n, 3) at a pulse: range sum minus that of the scene centre, (n,). [m]
+
+    The measured positions of the platforms are used.
+    """
     total: Floats = np.zeros(len(points))
     for position in (history.transmitter[pulse], history.receiver[pulse]):
         total = total + np.linalg.norm(position - points, axis=-1) - np.linalg.norm(position, axis=-1)
@@ -39,7 +42,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
     Parameters
     ----------
     history : PhaseHistory
-        Samples; apply a window to them before the call if one is wanted.
+        Recorded data. A window, if wanted, must already be applied to the samples.
     points : (..., 3) ndarray
         Positions of the pixels. [m]
 
@@ -54,7 +57,10 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
-    """Compute the sum of (4) over pulses and frequencies, with ΔR from `ranges(points, pulse)` for points (n, 3)."""
+    """Form an image at points (n, 3) by the sum of (4) over pulses and frequencies, (n,).
+
+    `ranges(points, pulse)` gives the differential ranges ΔR at a pulse, (n,). [m]
+    """
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
     coarse, fine = split(wavenumber) if is_even(history.frequency) else (wavenumber, np.zeros(1))
@@ -73,11 +79,11 @@ def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, 
 
 
 def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto") -> Complexes:
-    """Form an image by interpolation of range profiles, equal to (4) to -120 dB at a fraction of its cost.
+    """Form an image by interpolation of range profiles; it equals (4) to -120 dB at a fraction of the cost.
 
-    The spectrum of each pulse is divided by the transform of a spline, transformed to a range profile by FFT, and
-    interpolated at the differential ranges of the pixels. A profile repeats every c/Δf in range, with Δf the step of
-    frequency. Pixels that are farther apart alias; the caller must prevent this.
+    The spectrum of each pulse is divided by the transform of a spline and transformed to a range profile by FFT. The
+    profile is interpolated at the differential ranges of the pixels. A profile repeats every c/Δf in range, with the
+    frequency step Δf. Pixels that are farther apart alias; the caller must prevent this.
 
     Parameters
     ----------
@@ -119,7 +125,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Choose the backprojection kernel that fits a memory limit. [B]
+    """Choose the backprojection kernel, "cubic" or "numpy", that fits a memory limit. [B]
 
     The compiled kernel is chosen only with ample memory, because its code takes 60 MB.
     """
@@ -169,9 +175,10 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Interpolate a periodic cubic B-spline at fractional sample positions `cell`, (n,).
+    """Evaluate a periodic cubic B-spline at fractional sample positions `cell` (n,), (n,).
 
-    `spline` (samples + 3,) are the coefficients at the samples, extended periodically by one before and two after.
+    `spline` (samples + 3,) are the coefficients at the samples. They are extended periodically by one coefficient at
+    the start and two at the end.
     """
     first = np.floor(cell)
     fraction = cell - first
@@ -191,27 +198,33 @@ def _read(spline: Complexes, cell: Floats) -> Complexes:
 
 # ---------------------------------------------------------------------- range profiles
 def profile_length(history: PhaseHistory, oversampling: int) -> int:
-    """Number of samples of a profile, a power of two. They span the range c/Δf after which the profile repeats."""
+    """Number of samples of a range profile over its period c/Δf: a power of two.
+
+    It is at least `oversampling` times the number of frequencies.
+    """
     return 1 << (history.frequency.size * oversampling - 1).bit_length()
 
 
 def cells_per_metre(history: PhaseHistory, length: int) -> float:
-    """Number of profile samples per metre of ΔR."""
+    """Number of samples of a range profile per metre of differential range ΔR. [1/m]"""
     step = (history.frequency[-1] - history.frequency[0]) / max(1, history.frequency.size - 1)
     return float(length * step / SPEED_OF_LIGHT_MPS)
 
 
 def carrier_frequency(history: PhaseHistory) -> float:
-    """Carrier frequency that is removed from profiles: that of the middle sample, not always mid-band. [Hz]"""
+    """Carrier frequency that is removed from range profiles: the frequency of the middle sample. [Hz]
+
+    It is not the centre of the band if the number of frequencies is even.
+    """
     return float(history.frequency[history.frequency.size // 2])
 
 
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
-    """Range profiles of a slice of pulses: Σ S_k exp(+2πj k n/length), where k is the index from the carrier.
+    """Range profiles of some pulses: Σ S_k exp(+2πj k n/length), where k counts frequencies from the carrier.
 
     A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled, and is
-    later interpolated by convolution with a short kernel. The spectrum is therefore first divided by the transform of
-    this kernel.
+    later interpolated by convolution with a short kernel. The samples S_k are therefore first divided by the
+    transform of this kernel.
 
     Parameters
     ----------
@@ -220,7 +233,7 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
     length : int
         Number of samples of a profile.
     transform : (frequencies,) ndarray
-        Fourier transform of the interpolation kernel, at the frequencies of `harmonics`.
+        Fourier transform of the interpolation kernel, at the indices that `harmonics` gives.
     pulses : slice
         Pulses whose profiles are computed.
 
@@ -238,7 +251,7 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
 
 
 def harmonics(history: PhaseHistory) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Index of each frequency, counted from 0 at the carrier."""
+    """Index of each frequency of a phase history, counted from 0 at the carrier frequency, (frequencies,)."""
     count = history.frequency.size
     return np.arange(count) - count // 2
 
@@ -272,14 +285,14 @@ def ground_grid(
 
 
 def taylor_window(count: int, sidelobe_db: float = -35.0, nbar: int = 5) -> Floats:
-    """Taylor weights, mean 1, so that a windowed point keeps its peak.
+    """Taylor weights with a mean of 1, so that the response of a point keeps its peak, (count,).
 
     Parameters
     ----------
     count : int
-        Samples, at the centres of equal cells.
+        Number of samples, which are at the centres of equal cells.
     sidelobe_db : float
-        Level of the near sidelobes, below 0. [dB]
+        Level of the near sidelobes relative to the peak, a negative number. [dB]
     nbar : int
         Number of sidelobes at that level, plus one.
 

@@ -2,8 +2,8 @@
 
 A cut is a line of evenly spaced complex image samples that contains the full response. Sidelobes are measured outside
 a mask around the mainlobe. The mask is either fixed, from the first nulls of the error-free response, or given by the
-nulls of the response itself. If an image is formed with a window, the nulls of the response itself hide a quadratic
-phase error, because the shoulder that the error raises merges with the mainlobe.
+nulls of the response itself. If an image is formed with a window, a mask from its own nulls hides a quadratic phase
+error, because the shoulder that the error raises merges with the mainlobe.
 
 Other tools measure sidelobes only up to a distance from the peak. For example, perseo-quality computes its PSLR
 within five widths of the peak and its ISLR within ten. For a uniform aperture its ISLR is therefore -10.21 dB, not
@@ -36,11 +36,12 @@ _TAPS_COUNT = 6  # the error is -70 dB for three samples per cell
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse:
-    """Measures of one cut.
+    """Width, peak and sidelobe ratios of a point response along one cut.
 
-    `irw_m` is the width at half power. `peak` is the magnitude of the peak, and `peak_m` its position along the cut,
-    relative to the middle sample. `pslr_db` and `islr_db` count sidelobes that are farther than `mask_m` from the
-    peak. ISLR is the ratio of the energy of the sidelobes to the energy of the mainlobe.
+    `irw_m` is the width at half power. [m] `peak` is the magnitude of the peak. `peak_m` is its position along the
+    cut, relative to the middle sample. [m] `mask_m` is the half width of the mainlobe mask. [m] `pslr_db` and
+    `islr_db` are the peak and the integrated sidelobe ratio outside the mask. [dB] The integrated ratio is that of
+    the energy of the sidelobes to the energy of the mainlobe.
     """
 
     irw_m: float
@@ -53,10 +54,11 @@ class ImpulseResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class ImpulseResponse2D:
-    """Measures of a chip: the two cuts through its interpolated peak, and the sidelobe ratios of its full area.
+    """Measures of a point response in a small image: two cuts through its interpolated peak, and sidelobe ratios.
 
-    `peak_m` is the position relative to the middle sample of each axis. For `pslr_db` and `islr_db`, the mainlobe is
-    the rectangle given by `mask_m` of both cuts, and the sidelobes are the area outside it.
+    `peak` is the magnitude of the peak. `peak_m` is its position along x′ and y′, relative to the middle sample. [m]
+    `pslr_db` and `islr_db` are the peak and the integrated sidelobe ratio of the full area. [dB] For these ratios the
+    mainlobe is the rectangle given by `mask_m` of both cuts, and the sidelobes are the area outside it.
     """
 
     range_cut: ImpulseResponse
@@ -68,9 +70,9 @@ class ImpulseResponse2D:
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
-    """Interpolate periodic cuts (..., samples), each a full period, by a factor.
+    """Upsample periodic cuts (..., samples) by an integer factor, (..., samples · factor).
 
-    The carrier may lie anywhere in the band.
+    A cut must be a full period. Its spectrum may be centred anywhere in the sampling band.
     """
     count = cut.shape[-1]
     steps = np.arange(count * factor) / factor
@@ -84,10 +86,11 @@ def upsampled(cut: Complexes, factor: int) -> Complexes:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Interpolation weights (n, taps) for positions at offsets (n,) from a sample: a sinc with a Kaiser window.
+    """Weights (n, taps) that interpolate at offsets (n,) from a sample: a sinc function with a Kaiser window.
 
-    A Fourier transform of the full line would be exact if the line were periodic. But an image is cut off within its
-    sidelobes, and near a platform its band changes along the line. Distant samples would then add errors.
+    The offsets are in samples. The kernel is short on purpose. Interpolation by a Fourier transform of the full line
+    would be exact only if the line were periodic. But an image is cut off within its sidelobes, and near a platform
+    its band changes along the line, so distant samples would add errors.
     """
     distances = np.subtract.outer(offset, np.arange(1 - _REACH_SAMPLES, _REACH_SAMPLES + 1))
     inside = np.sqrt(np.maximum(1 - (distances / _REACH_SAMPLES) ** 2, 0))
@@ -96,14 +99,15 @@ def _kernel(offset: Floats) -> Floats:
 
 
 def _carrier_of(cut: Complexes) -> int:
-    """FFT bin at the centre of gravity of the spectra of cuts, (..., samples)."""
+    """Signed FFT bin at the centre of gravity of the power spectra of all cuts (..., samples)."""
     return _carrier(np.abs(np.fft.fft(cut).reshape(-1, cut.shape[-1])) ** 2)
 
 
 def _carrier(power: Floats) -> int:
-    """FFT bin at the centre of gravity of power spectra, (lines, bins), computed on a circle.
+    """Signed FFT bin at the centre of gravity of the sum of power spectra (lines, bins).
 
-    The spectrum is periodic, so its empty bins are on the opposite side of the circle.
+    It is computed on a circle, because the spectrum is periodic. The empty bins are on the opposite side of the
+    circle.
     """
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)
@@ -135,8 +139,8 @@ def impulse_response(
     Raises
     ------
     ValueError
-        The samples of the cut are all zero or not finite; or the peak, its half-power points, its mask or the reach
-        are at the edge of the cut.
+        The samples of the cut are all zero or not finite. Or the peak, its half-power points or its mask are at the
+        edge of the cut, or `reach_m` extends beyond it.
     """
     _check(cut)
     fine = np.abs(upsampled(cut, _UPSAMPLING_FACTOR))
@@ -175,7 +179,7 @@ def impulse_response(
 def impulse_response_2d(
     chip: Complexes, spacing_m: tuple[float, float], mask_m: tuple[float, float] | None = None
 ) -> ImpulseResponse2D:
-    """Measure a chip: its cuts along x′ and y′ through the interpolated peak, and its full area.
+    """Measure a point response in a small image: cuts along x′ and y′ through its peak, and its full area.
 
     Parameters
     ----------
@@ -240,7 +244,7 @@ def impulse_response_2d(
 
 
 def line_at(chip: Complexes, row: float | Floats) -> Complexes:
-    """Interpolate a line of a chip along its second axis at a fractional row; rows (n,) give lines (n, ny)."""
+    """Interpolate the line (ny,) of an image (nx, ny) at a fractional row; rows (n,) give lines (n, ny)."""
     count = chip.shape[0]
     turn = 2j * math.pi / count * _carrier_of(chip.T)
     rows = np.atleast_1d(row)
@@ -252,10 +256,11 @@ def line_at(chip: Complexes, row: float | Floats) -> Complexes:
 
 
 def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) -> float:
-    """Fractional row of the peak within a window of an image (nx, ny), which is treated as periodic.
+    """Fractional row of the peak within a window (rows, columns) of an image (nx, ny).
 
-    The peak is usually between two lines of pixels. With lines a third of a resolution cell apart, the nearer line
-    may be 0.4 dB below the peak.
+    The row is counted from the first row of the image. The interpolation treats the rows of the image and the columns
+    of the window as periodic. The peak is usually between two lines of pixels. With lines a third of a resolution
+    cell apart, the nearer line may be 0.4 dB below the peak.
     """
     magnitude = np.abs(image[window])
     row = float(np.argmax(magnitude.max(axis=1))) + window[0].indices(image.shape[0])[0]
@@ -268,7 +273,7 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) ->
 
 
 def place_of_peak(image: Complexes) -> tuple[float, float]:
-    """Fractional row and column of the peak of an image (nx, ny)."""
+    """Fractional row and column of the interpolated peak of an image (nx, ny), which is treated as periodic."""
     row = row_of_peak(image)
     power = np.abs(upsampled(line_at(image, row), _UPSAMPLING_FACTOR)) ** 2
     top = int(np.argmax(power))
@@ -276,7 +281,7 @@ def place_of_peak(image: Complexes) -> tuple[float, float]:
 
 
 def highest(chip: Complexes) -> float:
-    """Largest magnitude of a chip (nx, ny) after interpolation."""
+    """Largest magnitude of a small image (nx, ny) after interpolation in both axes."""
     columns = upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T
     blocks = (columns[start : start + _BLOCK_COLUMNS] for start in range(0, len(columns), _BLOCK_COLUMNS))
     return max(float(np.abs(upsampled(block, _CHIP_UPSAMPLING_FACTOR)).max()) for block in blocks)
@@ -298,7 +303,10 @@ def _peak(cut: Complexes) -> float:
 
 
 def _inside(count: int, lower: float, upper: float) -> Floats:
-    """Fraction of each sample's cell, of width 1, that is within an interval, (count,)."""
+    """Fraction of the cell of each of `count` samples that lies between two positions, (count,).
+
+    A cell is 1 sample wide and centred on its sample. The positions are in samples.
+    """
     positions = np.arange(count)
     return np.asarray(np.clip(np.minimum(positions + 0.5, upper) - np.maximum(positions - 0.5, lower), 0.0, 1.0))
 
@@ -328,7 +336,10 @@ def _null(power: Floats, top: int, direction: int) -> float:
 
 
 def _vertex(values: Floats, top: int) -> float:
-    """Offset from a sample to the extremum of the parabola through it and its two neighbours. [samples]"""
+    """Offset from the sample `top` to the extremum of the parabola through it and its two neighbours. [samples]
+
+    The result is 0 if the three samples are on a straight line.
+    """
     before, middle, after = values[top - 1 : top + 2]
     bend = before - 2 * middle + after
     return float((before - after) / (2 * bend)) if bend else 0.0
@@ -336,7 +347,10 @@ def _vertex(values: Floats, top: int) -> float:
 
 # ---------------------------------------------------------------------- an image read anywhere
 def between(values: Floats, row: Floats, column: Floats) -> Floats:
-    """Interpolate a table (nx, ny, k) linearly at fractional rows and columns (n,), and extrapolate beyond it."""
+    """Interpolate a table (nx, ny, k) linearly at fractional rows and columns (n,), (n, k).
+
+    Beyond the table the values are extrapolated.
+    """
     nx, ny = values.shape[:2]
     i = np.clip(np.floor(row).astype(np.int64), 0, nx - 2)
     j = np.clip(np.floor(column).astype(np.int64), 0, ny - 2)
@@ -349,9 +363,9 @@ def between(values: Floats, row: Floats, column: Floats) -> Floats:
 
 
 def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Fractional rows and columns of ground points (n, 2) in a grid (nx, ny, 2), (n,) each.
+    """Fractional rows and columns of ground points (n, 2) in a grid of pixels (nx, ny, 2), (n,) each.
 
-    They are NaN for points outside the grid.
+    Both are NaN for points more than half a pixel outside the grid.
     """
     nx, ny = grid.shape[:2]
     middle = grid[nx // 2, ny // 2]
@@ -400,7 +414,10 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
 
 
 def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
-    """Lagrange interpolation at scattered rows and columns of an image, which is treated as periodic."""
+    """Interpolate an image at scattered fractional rows and columns (n,) by Lagrange polynomials, (n,).
+
+    The image is treated as periodic.
+    """
     total = np.zeros(row.size, dtype=complex)
     (i, by_row), (j, by_column) = _weights(row), _weights(column)
     for a in range(_TAPS_COUNT):
@@ -412,13 +429,19 @@ def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
 
 
 def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
-    """First sample of each interpolation stencil, (n,), and a list with the weights (n,) of each tap."""
+    """First sample of the Lagrange stencil at each of `positions` (n,), and the weights of its samples.
+
+    The first samples are (n,). The list contains an array of weights (n,) for each sample of a stencil.
+    """
     first = np.floor(positions).astype(np.int64) - _TAPS_COUNT // 2 + 1
     return first, [lagrange_weight(positions - first, tap, _TAPS_COUNT) for tap in range(_TAPS_COUNT)]
 
 
 def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
-    """Lagrange weight of one sample of a stencil, for positions at `offset` from the first sample."""
+    """Lagrange weight of the sample with index `tap` in a stencil of `taps` samples, with the shape of `offset`.
+
+    `offset` are the positions of interpolation, counted from the first sample of the stencil. [samples]
+    """
     weight: Floats = np.ones(offset.shape)
     for node in range(taps):
         if node != tap:

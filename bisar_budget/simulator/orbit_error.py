@@ -24,7 +24,7 @@ def orbit_error(
     acceleration: Sequence[float],
     slow_time: Floats,
 ) -> Floats:
-    """Error of the measured path of a platform in free fall.
+    """Error of the measured path of a platform in free fall, from the errors of its state at mid-aperture.
 
     Parameters
     ----------
@@ -54,7 +54,10 @@ def orbit_error(
     push = np.array(acceleration, dtype=float)
 
     def rates(time: float, states: Floats) -> Floats:
-        """Velocity and acceleration of both orbits relative to the stars, in the axes of mid-aperture, (2, 2, 3)."""
+        """Inertial velocity and acceleration on both orbits, in axes fixed at mid-aperture, (2, 2, 3).
+
+        The first axis is the orbit, true and then measured. The second axis is the velocity, then the acceleration.
+        """
         places = states[:, 0]
         fallen = (
             -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3

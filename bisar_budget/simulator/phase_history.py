@@ -43,7 +43,7 @@ class PathSinusoid(NamedTuple):
 
 
 class ReceiverNoise(TypedDict, total=False):
-    """Keyword arguments of `phase_history` for receiver noise."""
+    """Keyword arguments of `phase_history` for receiver noise: its power and the random generator."""
 
     noise_power: float
     rng: np.random.Generator | None
@@ -51,20 +51,23 @@ class ReceiverNoise(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Error as a function of slow time: `times` (n,) [s], and `values` (n,) or (n, 3) with linear interpolation."""
+    """Error as a function of slow time, given by samples with linear interpolation between them.
+
+    `times` (n,) are the slow times of the samples. [s] `values` are (n,), or (n, 3) for vectors.
+    """
 
     times: Floats
     values: Floats
 
     def at(self, slow_time: Floats) -> Floats:
-        """Interpolate the values linearly at other slow times, (m,) or (m, 3)."""
+        """Interpolate the values linearly at given slow times (m,), (m,) or (m, 3)."""
         if self.values.ndim == 1:
             values: Floats = np.interp(slow_time, self.times, self.values)
             return values
         return np.stack([np.interp(slow_time, self.times, column) for column in self.values.T], axis=1)
 
     def plus(self, other: "Course") -> "Course":
-        """Sum of two errors, at the times of both."""
+        """Sum of this error and another, sampled at the times of both."""
         times = np.union1d(self.times, other.times)
         return Course(times, self.at(times) + other.at(times))
 
@@ -76,7 +79,7 @@ class Course:
 
     @property
     def mean(self) -> float:
-        """Mean of the values (n,) over time."""
+        """Mean over time of the linearly interpolated values (n,)."""
         middles = (self.values[1:] + self.values[:-1]) / 2
         return float(middles @ np.diff(self.times) / (self.times[-1] - self.times[0]))
 
@@ -87,8 +90,9 @@ class PathError(NamedTuple):
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are in
     east-north-up. Noise, and vibrations without an axis, are along the line of sight, positive away from the scene.
     The errors of position, velocity and acceleration are those at mid-aperture. For a platform in free fall they give
-    the difference between two orbits; for any other platform they are a polynomial of time. `height` [m] is the
-    height by which the scene is assumed too high. It moves the measured path up, and does not change an orbit.
+    the measured orbit minus the true orbit. For any other platform they are the coefficients of a polynomial of time.
+    `height` [m] is the height by which the scene is assumed too high. It moves the measured path up, and does not
+    change an orbit.
     `time_tag` [s] is the delay of the time tags: the measured position at a time τ is the true position at τ plus the
     delay. `wideband_rms` [m] is the RMS position noise of the pulses, white or within `wideband_band` (low, high)
     [Hz]. It requires a random generator.
@@ -105,15 +109,18 @@ class PathError(NamedTuple):
     height: float = 0.0
 
     def slow(self) -> "PathError":
-        """Return the same error with its `course` replaced by the smooth part."""
+        """Return the same error with `course` replaced by its smooth part, a polynomial of slow time.
+
+        Vibration is not changed.
+        """
         return self if self.course is None else self._replace(course=self.course.smooth())
 
     def still(self) -> "PathError":
-        """The same error without vibration."""
+        """Return the same error without sinusoidal and wideband vibration."""
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Sum of two errors, without vibration."""
+        """Sum of this error and another, without the vibration of either."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
@@ -137,21 +144,21 @@ class Errors(NamedTuple):
     electrons: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
-        """Return the same errors, with the error of one platform replaced."""
+        """Return the same errors, with the path error of `platform`, "transmitter" or "receiver", replaced."""
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """Return the same errors without vibration, and with each error over time replaced by its smooth part."""
+        """Return the same errors without vibration, and with each `Course` replaced by its smooth part."""
         return self.slow().still()
 
     def still(self) -> "Errors":
-        """The same errors without vibration."""
+        """Return the same errors without the vibration of both platforms."""
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """Return the same errors with each error over time replaced by its smooth part.
+        """Return the same errors with each `Course` replaced by its smooth part; vibration is not changed.
 
-        Noise would distort a phase that is computed from only a few nodes.
+        Fast noise would distort a phase that is computed from only a few slow times.
         """
         return self._replace(
             transmitter=self.transmitter.slow(),
@@ -162,7 +169,7 @@ class Errors(NamedTuple):
 
 
 def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
-    """Sum of the errors of several sources, without vibration."""
+    """Sum of several sets of errors in one image, without vibration."""
     total = Errors()
     for errors in errors_of_sources:
         total = Errors(
@@ -176,7 +183,7 @@ def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
 
 
 def _sum(course: Course | None, other: Course | None) -> Course | None:
-    """Sum of two errors over time, either of which may be missing."""
+    """Sum of two errors over time; None counts as zero, and the sum is None if both are None."""
     return course.plus(other) if course is not None and other is not None else course or other
 
 
@@ -188,17 +195,18 @@ class Path:
     measured: Floats
 
     def seen_from(self, ground_point: GroundVector) -> "Path":
-        """The same path relative to a ground point."""
+        """Return the same path with positions relative to a ground point."""
         offset = np.array([*ground_point, 0.0])
         return Path(actual=self.actual - offset, measured=self.measured - offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Paths of both platforms at a set of slow times, and the clock errors at these times, (times,). [s]
+    """Paths of both platforms at given slow times, and the clock errors and delays at these times, (times,) each.
 
-    `electrons` is the delay by free electrons at a frequency of 1 Hz, or None. [s·Hz²] `seen` is a clock error that
-    has the same effect at the centre frequency as `clock` and the electrons together. [s]
+    `clock` is the clock error. [s] `electrons` is the delay by free electrons at a frequency of 1 Hz, or None without
+    such a delay. [s·Hz²] `seen` is the clock error that alone would have the same effect on an image as `clock` and
+    the electrons together. [s]
     """
 
     transmitter: Path
@@ -213,12 +221,15 @@ class Flight:
         return self.transmitter, self.receiver
 
     def as_measured(self) -> "Flight":
-        """The flight that the processor assumes: the measured paths and a perfect clock."""
+        """Return the flight that the processor assumes: the measured paths and a perfect clock."""
         transmitter, receiver = (Path(actual=path.measured, measured=path.measured) for path in self.paths)
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
     def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-        """Recorded range sum of `scatterer` minus the range sum of `seen_at` for the measured paths, (times,). [m]"""
+        """Recorded range sum of `scatterer` minus the range sum of `seen_at` for the measured paths, (times,). [m]
+
+        Both are ground points. The recorded range sum includes the clock error `seen`.
+        """
         scatterer_position, seen_position = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
         total: Floats = np.zeros(self.clock.shape)
         for path in self.paths:
@@ -235,7 +246,10 @@ class Flight:
         frequency: Floats,
         **noise: Unpack[ReceiverNoise],
     ) -> "PhaseHistory":
-        """Record the phase history of scatterers at these slow times, as `phase_history` does."""
+        """Record the phase history of scatterers with the paths and clock errors of this flight.
+
+        The arguments are those of `phase_history`. `slow_time` must be the slow times of the flight.
+        """
         return phase_history(
             scatterers,
             amplitudes,
@@ -266,7 +280,7 @@ class PhaseHistory:
 
 
 def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
-    """Sum of the unit vectors from the origin to both platforms, as in (6), (pulses, 3)."""
+    """Sum of the unit vectors from the scene centre to both platforms, as in (6), (pulses, 3)."""
     total: Floats = np.zeros(transmitter.shape)
     for positions in (transmitter, receiver):
         total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
@@ -274,23 +288,27 @@ def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
 
 
 def cell_centres(length: float, count: int) -> Floats:
-    """Centres of `count` equal cells that divide an interval of a given length about zero."""
+    """Centres of `count` equal cells that divide an interval of a given length, centred at zero, (count,)."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
     return centres
 
 
 def is_even(frequency: Floats) -> bool:
-    """Whether frequencies are evenly spaced except for rounding, which is negligible within kilometres of range."""
+    """Whether more than two frequencies are given and are evenly spaced.
+
+    Rounding errors are accepted if they are negligible within kilometres of range.
+    """
     return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
     )
 
 
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
-    """Split evenly spaced wavenumbers into coarse and fine wavenumbers; the sums of all pairs are the given ones.
+    """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums are the given wavenumbers.
 
-    The sums are in the given order, row by row. The last row may extend beyond the given wavenumbers. The phasor of a
-    sum is a product of phasors, so n wavenumbers need only 2√n exponentials.
+    The table of sums, with a line for each coarse wavenumber, contains the given wavenumbers in order. Its last line
+    may extend beyond them. The phasor of a sum is a product of two phasors, so n wavenumbers need only about 2√n
+    exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -305,12 +323,12 @@ def path(
     rng: np.random.Generator | None = None,
     way: Floats | None = None,
 ) -> Path:
-    """Actual positions of one platform along its path, and its positions as measured with an error.
+    """Compute the actual positions of one platform, and the positions that are measured with an error.
 
     Parameters
     ----------
     state : PlatformState
-        Path of the platform, with its state at τ = 0.
+        State of the platform at τ = 0, which gives its true path.
     slow_time : (pulses,) ndarray
         Slow times of the pulses. [s]
     error : PathError, optional
@@ -318,8 +336,8 @@ def path(
     rng : numpy Generator, optional
         Random generator, required for wideband vibration only.
     way : (pulses, 3) ndarray, optional
-        Displacement per metre of noise and of vibrations without an axis. [m/m] If None, the displacement is along
-        the line of sight.
+        Displacement vector per metre of noise and of vibrations without an axis. [m/m] None means the unit vector
+        along the line of sight.
 
     Raises
     ------
@@ -362,7 +380,11 @@ def _placed(state: PlatformState, slow_time: Floats) -> Floats:
 
 
 def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:
-    """Gaussian noise of variance 1 at the pulses, white or within a band. [Hz]"""
+    """Gaussian noise of variance 1 at the slow times of the pulses, (pulses,).
+
+    It is white if `band` is None, and otherwise within the band (low, high). [Hz] A `ValueError` is raised if the
+    band contains no frequency that the pulses can sample.
+    """
     white: Floats = rng.normal(0.0, 1.0, slow_time.shape)
     if band is None:
         return white
@@ -384,11 +406,12 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 
 
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
-    """Shortest displacements of each platform that change the range minus the baseline by one metre. [m/m]
+    """Shortest displacement of each platform that changes the bistatic range minus the baseline by one metre. [m/m]
 
-    The baseline is the length of the direct path. Both results are (pulses, 3). The displacement of the transmitter
-    is along u_t − b, and that of the receiver along u_r + b, where u is the line of sight and b the unit vector from
-    receiver to transmitter. It is zero for a platform that cannot change the difference.
+    The baseline is the length of the direct path. Both results are (pulses, 3), the transmitter first. The
+    displacement of the transmitter is along u_t − b, and that of the receiver along u_r + b. Here u_t and u_r are the
+    unit vectors from the scene centre to the platforms, and b is the unit vector from receiver to transmitter. The
+    displacement is zero for a platform whose motion cannot change the bistatic range minus the baseline.
     """
     platforms = (
         PlatformState(position=platform.place(slow_time), velocity=platform.velocity) for platform in geometry.both
@@ -404,10 +427,10 @@ def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Flo
 
 
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
-    """Clock error of a receiver that takes the direct path as its clock, (pulses,). [s]
+    """Clock error of a receiver that uses the direct signal of the transmitter as its clock, (pulses,). [s]
 
-    It is the error of the measured distance between the platforms, divided by c. The receiver's clock is the direct
-    signal, which is delayed by the actual distance; the processor subtracts the measured distance.
+    It is the measured minus the actual distance between the platforms, divided by c. The delay of an echo after the
+    direct signal is shorter by the actual distance, and the processor corrects it for the measured distance.
     """
     transmitter, receiver = paths
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
@@ -446,7 +469,7 @@ def phase_history(
     clock_error : (pulses,) ndarray or float
         t̃(τ) of (1). [s]
     electrons : (pulses,) ndarray, optional
-        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer. [s·Hz²]
+        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer. [s·Hz²] None means no delay.
     noise_power : float
         Variance of the circular white Gaussian noise of a sample, relative to amplitude 1.
     rng : numpy Generator, optional
@@ -514,7 +537,10 @@ def exact_effect(
     radar: Radar,
     aperture_time_s: float,
 ) -> ExactEffect:
-    """Effect of one error by exact ranges, from paths sampled at any slow times (see `ranges.exact_ranges`).
+    """Compute from exact ranges the displacement and the remaining phases that path and clock errors cause.
+
+    The point is the origin of the paths. `slow_time` [s] may be unevenly spaced, and its middle element must be
+    mid-aperture. The solution is that of `ranges.exact_ranges`.
 
     Raises
     ------
@@ -540,12 +566,15 @@ def exact_effect(
 
 
 def _columns(positions: Floats) -> VectorArrays:
-    """Components x, y and z of positions (..., 3), each of shape (..., 1)."""
+    """Components x, y and z of positions (..., 3), as three arrays of shape (..., 1)."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z
 
 
 def _sampling(nodes: Floats) -> Sampling:
-    """Sampling at arbitrary positions in −1 … 1, with weights from a polynomial that is fitted to the samples."""
+    """Sampling of range histories at any slow times `nodes` (samples,), in units of half the aperture time.
+
+    The weights that give the Legendre parts of a history come from a polynomial fitted to its samples.
+    """
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
     return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

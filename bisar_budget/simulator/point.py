@@ -1,4 +1,4 @@
-"""Images of points with the declared errors of a mission: Sections V and VI of Rigling & Moses, Figures 3 to 7."""
+"""Images of point targets with a mission's declared errors: Rigling & Moses, Sections V and VI, Figures 3 to 7."""
 
 import math
 import time
@@ -77,13 +77,13 @@ class SimulationError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Position and measures of one target in the images.
+    """Position of one target in the images, and the measured width, peak and sidelobes of its response.
 
     `effect` is the effect of the errors, computed from exact ranges, with the displacement relative to the target.
-    The image former shows the target at `shown` in the rotated images and at `shown_in_scene` in the image along (x,
-    y), east and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through the target
-    in the image without errors, the image with errors and the image after autofocus. They are None where neighbours
-    cover the response.
+    The image former shows the target at `shown` in the rotated images, and at `shown_in_scene` in the image along
+    (x, y); both are east and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through
+    the target in the image without errors, the image with errors and the image after autofocus. A measure is None if
+    the response cannot be measured, for example because a neighbouring target covers it.
     """
 
     target: Target
@@ -96,7 +96,7 @@ class Response:
 
 
 class PointImages(NamedTuple):
-    """Images of point scatterers, by default of one at the scene centre, with quantities that explain them.
+    """Images of point scatterers, by default a single point at the scene centre, with quantities that explain them.
 
     All points are in the axes of the scene, east and north of its centre. [m]
 
@@ -113,8 +113,8 @@ class PointImages(NamedTuple):
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
     the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error of
-    the measured peak of a single point without errors, which is too high if the pixels do not sample the response
-    well enough; NaN if unknown. [dB] `outside` names the declared paired echoes that are beyond the patch.
+    the measured peak of a single point without errors. [dB] It is above 0 if the pixels do not sample the response
+    well enough, and NaN if it is unknown. `outside` names the declared paired echoes that are beyond the patch.
     """
 
     slow_time: Floats
@@ -146,28 +146,30 @@ class PointImages(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """Ground patch around a displaced point: numbers of pixels along both axes, and their spacing. [m]"""
+    """Ground patch around the displaced points: numbers of pixels along both axes, and their spacing. [m]"""
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
 
     @property
     def pixels(self) -> int:
-        """Number of pixels."""
+        """Number of pixels of the patch."""
         return self.shape[0] * self.shape[1]
 
     @property
     def size(self) -> tuple[float, float]:
-        """Extent along both axes. [m]"""
+        """Extent of the patch along both axes. [m]"""
         return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Patches, samples and memory that the images of a mission need, determined before an image is formed.
+    """Patch sizes, numbers of samples and memory that a mission's images need, chosen before an image is formed.
 
-    A range cell has `finer` times as many pixels as a cross-range cell. The response of a target is `own_cells`
-    resolution cells wide in cross-range.
+    `rotated` is the patch of the images along (x′, y′), and `in_scene` that of the image along (x, y). A range cell
+    has `finer` times as many pixels as a cross-range cell. The response of a target, with its margin, is `own_cells`
+    resolution cells wide in cross-range. `outside` names the paired echoes that are beyond the patch, or is empty.
+    `bytes_held` is the memory of the image formers besides images and phase history. [B]
     """
 
     rotated: Patch
@@ -181,7 +183,7 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """Largest memory that is in use at one time. [B]"""
+        """Largest memory that is in use at a time, for images, phase history and image formation. [B]"""
         images = _BYTES_PER_SCENE_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED_PIXEL * self.rotated.pixels
         return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + self.bytes_held
 
@@ -191,7 +193,11 @@ class Plan:
         return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
 
     def require_memory(self, limit: float, given_pulses: int | None) -> None:
-        """Raise a `SimulationError` if the plan needs more memory than a limit. [B]"""
+        """Raise a `SimulationError` if the plan needs more memory than a limit. [B]
+
+        The message also proposes fewer pulses if `given_pulses`, the number in the mission file, is larger than
+        necessary. None means that the file gives no number.
+        """
         if self.memory > limit:
             x, y = self.rotated.shape
             fewer = ""
@@ -215,17 +221,17 @@ def simulate_point(
 
     Errors have the signs and the coverage factor of the mission file. A covariance has no sign: its error is the most
     probable error whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is
-    part of the data; wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
+    part of the data. Wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
     along the lines of equal range of the measured paths, and long enough for the smear and the paired echoes. The
-    error-free image is formed by the same processor, from points at the displaced places that are recorded from the
-    measured paths.
+    error-free image is formed by the same processor. Its data are those of points at the displaced positions,
+    recorded as if the platforms flew the measured paths.
 
     Parameters
     ----------
     mission : Mission
         The mission, as loaded.
     progress : callable
-        Called with the number of pixels times pulses that are done, and with the total number.
+        Called during image formation with the number of pixels times pulses that is done, and with the total number.
     image_former : str
         One of `IMAGE_FORMERS`. The polar format forms only the rotated images; the image along (x, y) is then formed
         by backprojection. In the paper, too, Figure 5 is formed by (4) and Figure 6 by (14).
@@ -312,9 +318,9 @@ def simulate_point(
     formed, windows = (error_free, rotated, focused), [_window(plan, cells, index) for index in range(len(shown))]
 
     def rows_of(index: int) -> tuple[float, ...]:
-        """Rows of the peaks of a target, one for each image.
+        """Fractional rows of the peak of a target in the error-free, the rotated and the focused image.
 
-        The rows differ, because with errors a target is in focus at another range.
+        The rows differ between images, because errors change the row in which a target is in focus.
         """
         smeared_rows = [row_of_peak(image, windows[index]) for image in formed[1:]]
         if isinstance(former, ExactRangeFormer):
@@ -386,7 +392,8 @@ def simulate_point(
 def declared_errors(mission: Mission) -> Errors:
     """Declared errors of a mission in one flight, with the signs, the seed and the coverage factor of its file.
 
-    A covariance has no sign: its error is the most probable error whose quadratic phase is one sigma.
+    A covariance has no sign. Its error is the most probable error whose quadratic phase is one sigma, times the
+    coverage factor.
     """
     analysis = Analysis(mission)
     sizes = {source.id: source.declared for source in analysis.stated if source.displaces}
@@ -409,11 +416,11 @@ def declared_errors(mission: Mission) -> Errors:
 
 
 def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
-    """Errors together with motions and phases that have the effects which `other_errors` states.
+    """Add motions and phases to errors, so that they also have the effects that `other_errors` states.
 
-    A quadratic and a cubic phase are a phase of the receiver over slow time. A displacement moves both measured paths
-    to the east, which moves the image to the east by the same distance. A stated ISLR is white noise of the receiver.
-    None of them has the coverage factor.
+    A quadratic and a cubic phase are added as a clock error over slow time. A displacement moves both measured paths
+    to the east, which moves the image to the east by the same distance. A stated ISLR becomes white noise of the
+    measured path of the receiver. The coverage factor is not applied to these effects.
     """
     quadratic, cubic, shift = (
         math.fsum(getattr(stated, effect) or 0.0 for stated in mission.other_errors) for effect in OTHER_EFFECTS[:3]
@@ -441,7 +448,10 @@ def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
 def _formers(
     collection: PointCollection, image_former: str, lines: RangeLines, flight: Flight
 ) -> tuple[Former, Former]:
-    """Image formers for the rotated images, and for the image along (x, y)."""
+    """Image formers for the rotated images, and for the image along (x, y), in this order.
+
+    They are the same, except that the polar format is combined with backprojection for the image along (x, y).
+    """
     radar = collection.radar
     exact = ExactRangeFormer(lines, radar, image_former == "matched_filter", collection.kernel)
     if image_former in ("backprojection", "matched_filter"):
@@ -468,8 +478,10 @@ def _plan(
 ) -> Plan:
     """Choose the smallest patches and numbers of samples with which the images contain the responses.
 
-    The sizes follow from the remaining range error and its slope. Along lines of equal range and of equal Doppler,
-    the band of a response is a box and its smear is along y′. In (x, y) both are rotated.
+    The sizes follow from the remaining range error [m] and its slope [m/s] over slow time. `shown` and `scene_shown`
+    (targets, 2) are the ground points at which both image formers show the targets. [m] Along lines of equal range
+    and of equal Doppler, the band of a response is a rectangle and its smear is along y′. In the image along (x, y)
+    both are rotated.
     """
     T, radar = mission.collection.aperture_time, mission.radar
     centre, scene_centre = _middle(shown), _middle(scene_shown)
@@ -533,7 +545,8 @@ def _plan(
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
     """Sinusoidal motions of both platforms: declared vibrations, and motions equivalent to oscillator phases.
 
-    An equivalent motion causes the same phase as an oscillator that vibrates with its platform.
+    An equivalent motion causes the same phase as an oscillator that vibrates with its platform. Motions with an
+    amplitude of 0 are omitted.
     """
     return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
 
@@ -546,9 +559,11 @@ def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
 
 
 def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
-    """Motion of one declared vibration: along three axes, or along the line of sight if the file gives one number.
+    """Sinusoidal motions of a platform that represent one declared vibration.
 
-    The phases of the axes are chosen so that the motions add up along the line of sight at mid-aperture.
+    `entry` is the index of the vibration in the list of the mission file. If its displacement is declared along three
+    axes, there is a motion along each axis. If it is a single number, the motion is along the line of sight. The
+    phases of the axes are chosen so that the motions add up along the line of sight at mid-aperture.
     """
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
@@ -563,10 +578,11 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
 
 
 def pulses_for(mission: Mission, cells: int) -> int:
-    """Number of pulses that samples the patch and every declared vibration without aliasing.
+    """Number of pulses with which the patch and every declared vibration are sampled without aliasing.
 
-    Without `collection.pulses` it is at least two per resolution cell and four per cycle of vibration. Raises a
-    `SimulationError` if the declared number is too small, or if the necessary number is too large.
+    It is `collection.pulses` if the mission file declares it. Otherwise it is a power of two, with at least two
+    pulses per resolution cell and four per cycle of vibration. A `SimulationError` is raised if the declared number
+    is too small, or if the necessary number is too large.
     """
     pulses = mission.collection.pulses
     cycles = max((line.frequency for line in _flown_lines(mission)), default=0.0) * mission.collection.aperture_time
@@ -594,8 +610,8 @@ def pulses_for(mission: Mission, cells: int) -> int:
 def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
     """Measure the impulse response of a cross-range cut, with its peak shifted cyclically to the middle.
 
-    If a smear covers most of the patch, its peak is near one end of the cut, and the shift wraps the smear around. If
-    the measurement then fails, it is repeated with zeros that double the length of the cut.
+    If a smear covers most of the patch, its peak may be near an end of the cut, and the shift wraps the smear around.
+    If the measurement then fails, it is repeated with zeros appended that double the length of the cut.
     """
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
@@ -609,9 +625,10 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
     """Random scatterers of clutter over a patch: positions (n, 2) [m] and circular normal amplitudes (n,).
 
     There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
-    so `level_db` is the mean power of a pixel. If a range cell has `finer` times more pixels than a cross-range cell,
-    scatterers up to a range cell beyond the patch also contribute to it. They are out of focus: their blur in
-    cross-range grows by some cells for each line of distance.
+    so `level_db` is the mean power of a pixel. Both results are empty if `level_db` is None. A range cell has `finer`
+    times as many pixels as a cross-range cell. If `finer` is above 1, scatterers up to a range cell beyond the patch
+    also contribute to it. They are out of focus, and their blur in cross-range grows by some cells for each line of
+    distance.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
@@ -629,7 +646,12 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
 
 
 def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
-    """Rows and columns of the rotated patch around a target, up to halfway to the nearest other target."""
+    """Window (rows, columns) around the target with the given index in the rotated patch.
+
+    `cells` (targets, 2) are the positions of the targets in resolution cells from the middle of the patch. A single
+    target gets the whole patch. Among several targets, the window ends halfway to the nearest target of a similar
+    range, but it has at least a minimum width.
+    """
     distances = np.abs(cells - cells[index])
     neighbours = distances[(distances[:, 0] < 2 * _SEPARATE_RANGE_CELLS) & (distances[:, 1] > 0), 1]
     reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
@@ -646,9 +668,10 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
 def _cuts(
     images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
 ) -> list[ImpulseResponse | None]:
-    """Measures of a target in each image, with the mask from the first image, which has no errors.
+    """Measure a target in each image, with the mainlobe mask of the first image, which has no errors.
 
-    The entry is None for an image in which the target cannot be measured.
+    The entry is None for an image in which the target cannot be measured. All entries are None if the peak in the
+    first image is not above half of `amplitude`, because the patch then does not contain the target.
     """
     measures: list[ImpulseResponse | None] = []
     mask = None

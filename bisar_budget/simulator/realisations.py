@@ -1,8 +1,8 @@
-"""Random time series of the errors of sensors, clocks and the atmosphere within one aperture.
+"""Random time series of sensor, clock and atmosphere errors within one aperture.
 
-The time series check the formulas of the budget and do not use them. Random walks are sums of steps. Correlated noise
-is computed by its recursion. Phase noise is a sum of tones. Synchronisation subtracts the straight lines between
-samples of the phase noise.
+The time series check the formulas of the budget, so they do not use these formulas. Random walks are sums of steps.
+Correlated noise is computed by its recursion. Phase noise is a sum of tones. Synchronisation by pulse exchanges
+subtracts straight lines between the values of the phase noise at the exchanges.
 """
 
 import math
@@ -64,12 +64,12 @@ _MAX_FLOWN_STEPS = 1 << 19  # of phase noise; beyond, fast tones are interpolate
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Random position errors that one sensor causes, for one sigma of the declared size.
+    """Draw the position errors that a random error causes, for one sigma of the declared size.
 
-    The keys are the names of the platforms. The values are (draws, times, 3): east, north, up. [m] The error is an
-    error of an inertial sensor or of a lever arm, or correlated noise. If it is common to both platforms, both use
-    the same random numbers along their axes. `declared` only scales the result: the ratios between the axes are those
-    of the mission. `times` (times,) are slow times within the aperture. [s]
+    The error is that of an inertial sensor or of a lever arm, or correlated position noise. The keys of the result
+    are the names of the platforms. The values are (draws, times, 3): east, north, up. [m] If the error is common to
+    both platforms, both use the same random numbers along their axes. `declared` of the error only scales the result.
+    The ratios between the axes are those of the mission. `times` (times,) are slow times within the aperture. [s]
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     courses = {}
@@ -88,14 +88,20 @@ _Motions = list[tuple[Floats, Floats]]
 def _drawn_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Random series and directions of the motion of each platform, for a unit error along its largest axis."""
+    """Draw the motion of each platform as random series with directions, by name of the platform.
+
+    The largest component of the error is 1.
+    """
     return error.kind.find_in(_MOTION_DRAWS, error.subject.axis)(mission, error, times, draws, rng)
 
 
 def _noise_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Motion by correlated noise of a position. Platforms that share the noise have the same random series."""
+    """Draw the motion due to correlated position noise, by name of the platform, with a largest component of 1.
+
+    Platforms that share the noise get the same series.
+    """
     process = process_of(mission, error)
     _, sizes = parts_of_largest(np.array(process.sigma))
     of_axis = [
@@ -110,7 +116,11 @@ def _noise_motions(
 def _sensor_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Motion by an inertial sensor: through the measured acceleration, and through the lever arm if one is stated."""
+    """Draw the motion that an error of an inertial sensor causes, with a largest component of 1.
+
+    The motion follows from the acceleration error. If the sensor error tilts the platform and the mission file states
+    a lever arm, the swing of the lever arm is added.
+    """
     figure, motion = INERTIAL_FIGURES[error.subject.axis], _motion(mission, error.owner)
     state: PlatformState = getattr(mission.platforms, error.owner).state
     pushes = acceleration_errors(
@@ -128,7 +138,10 @@ def _sensor_motions(
 def _swing_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Motion by an attitude error through the lever arm alone."""
+    """Draw the motion of the antenna that an attitude error causes through the lever arm, with a largest tilt of 1.
+
+    The acceleration error due to the tilt is not included.
+    """
     motion, swings = _motion(mission, error.owner), _swings(mission, error.owner, times)
     assert swings is not None
     drawn = _drawn_by_axis(motion, INERTIAL_FIGURES["attitude"], times, draws, rng)
@@ -138,7 +151,10 @@ def _swing_motions(
 def _arm_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Motion by an error of the lever arm itself, which turns with the body."""
+    """Draw the motion that an error of the lever arm itself causes, with a largest component of 1.
+
+    The error turns with the body of the platform.
+    """
     lever = _motion(mission, error.owner).lever_arm
     uncertainty = lever.uncertainty if lever is not None else None
     _, sizes = parts_of_largest(np.array(uncertainty or (1.0, 1.0, 1.0)))
@@ -162,9 +178,10 @@ _MOTION_DRAWS: Mapping[
 def _drawn_by_axis(
     motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Floats, Floats]]:
-    """Draw the errors of a sensor along each axis, for one unit of the figure along its largest axis.
+    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component of `figure` is 1.
 
-    Yields the index of the axis, the position error per unit of acceleration, and the tilt, (draws, times) each.
+    Yields the index of the axis, the position error per unit of the acceleration that a unit error causes, and the
+    tilt. Both are (draws, times). An axis without an error is omitted.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.name, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
@@ -174,7 +191,10 @@ def _drawn_by_axis(
 
 
 def _swings(mission: Mission, name: str, times: Floats) -> Floats | None:
-    """Motion of the antenna per unit of tilt about each axis, (axes, times, 3); None without a lever arm. [m/rad]"""
+    """Motion of the antenna per unit of tilt about each axis, (axes, times, 3). [m/rad]
+
+    None if the mission file states no lever arm.
+    """
     motion, state = _motion(mission, name), getattr(mission.platforms, name).state
     if motion.lever_arm is None or motion.lever_arm.arm is None:
         return None
@@ -190,9 +210,9 @@ def _motion(mission: Mission, name: str) -> MotionError:
 def delay_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Random group delays at the centre frequency, (draws, times), for one sigma of the declared size. [m]
+    """Draw group delays at the centre frequency for one sigma of the declared size, (draws, times). [m]
 
-    The delay is that of one leg, or the sum of both legs if both have the same atmosphere.
+    The delay is that of the path to one platform, or the sum over both platforms if both have the same atmosphere.
     """
     return group_delays(mission, error, times, zenith_delays(mission, error, times, draws, rng))
 
@@ -200,7 +220,10 @@ def delay_courses(
 def zenith_delays(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Random zenith delays in units of the declared sigma, (draws, times): constant, or correlated over time."""
+    """Draw zenith delays in units of the declared sigma, (draws, times).
+
+    They are correlated over time if the mission file states a correlation time, and otherwise constant.
+    """
     correlation_time = correlation_time_of(mission, error.owner)
     if correlation_time is not None:
         return _correlated(float(correlation_time), times, draws, rng)
@@ -208,9 +231,9 @@ def zenith_delays(
 
 
 def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith: Floats) -> Floats:
-    """Group delays at the centre frequency, (draws, times). [m]
+    """Convert zenith delays to group delays along the signal path at the centre frequency, (draws, times). [m]
 
-    They are computed from `at_zenith`, the zenith delays in units of the declared sigma.
+    `at_zenith` (draws, times) are the zenith delays in units of the declared sigma.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     of_unit = np.zeros(times.shape)
@@ -221,28 +244,28 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
-    """Convert group delays by free electrons to `Errors.electrons`, the delay at 1 Hz. [s·Hz²]
+    """Convert group delays by free electrons to their delay at a frequency of 1 Hz, `Errors.electrons`. [s·Hz²]
 
-    `group` are the delays at the centre frequency, (times,). [m]
+    `group` are the delays at the centre frequency, (times,). [m] `times` are their slow times. [s]
     """
     return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
-    """Whether the phases of oscillators are simulated without mean and slope.
+    """Whether oscillator phases are simulated without mean and slope, because their setting is not stated.
 
-    This is so if the file does not state how the oscillators are set.
+    The setting is the adjustment of the oscillators before the aperture, which the mission file may state.
     """
     return any(error.displaces_unknown for error in random_errors(mission))
 
 
 def drawn_errors(analysis: Analysis) -> Errors:
-    """Draw one time series of each declared error of sensors, clocks and the atmosphere.
+    """Draw a time series of each declared error of sensors, clocks and the atmosphere, and combine them for an image.
 
-    The random numbers have the seed of the mission. Each series is multiplied by the coverage factor. The phase of a
-    clock includes the error of its setting. The phase of an oscillator has no mean and slope in two cases:
-    `timing_error` states the remainder of the setting, or the oscillator is free and the file does not state how it
-    is set.
+    The random numbers have the seed of the mission. Each series is multiplied by the coverage factor. The phase of an
+    oscillator includes the error with which it was set before the aperture. It has no mean and no slope in two cases:
+    `timing_error` states the clock error that remains after the setting, or the oscillator runs freely and the file
+    does not state how it is set.
     """
     mission = analysis.mission
     seed = (mission.simulation or Simulation()).seed
@@ -262,14 +285,16 @@ def drawn_errors(analysis: Analysis) -> Errors:
 
 
 class _DrawnErrors:
-    """Sums of the time series of errors, each multiplied by the coverage factor.
+    """Sums of the random time series of errors of one mission, each multiplied by the coverage factor.
 
     Parameters
     ----------
     mission : Mission
         The mission, in one case.
-    times, noise_times : (n,)
-        Slow times of the samples of errors that change slowly, and of vibration and phase noise. [s]
+    times : (n,)
+        Slow times at which slowly changing errors are sampled. [s]
+    noise_times : (m,)
+        Slow times at which vibration and phase noise are sampled. [s]
     """
 
     def __init__(self, mission: Mission, times: Floats, noise_times: Floats) -> None:
@@ -280,17 +305,17 @@ class _DrawnErrors:
         self._air = dict.fromkeys(DELAYS, np.zeros(times.size))
 
     def add_motion(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the motion of platforms by a sensor, by a lever arm, or by noise of a position."""
+        """Draw the platform motion that a sensor, a lever arm or position noise causes, and add it to the motions."""
         for name, series in position_courses(self.mission, error, self.times, 1, rng).items():
             self._motions.append((name, Course(self.times, self.factor * series[0])))
 
     def add_delay(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the delay of the echoes in the air."""
+        """Draw the delay of the echoes in the atmosphere, and add it to the delays of the same kind."""
         (group,) = self.factor * delay_courses(self.mission, error, self.times, 1, rng)
         self._air[error.subject.axis] = self._air[error.subject.axis] + group
 
     def add_vibration(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the vibration of a platform as its motion along the line of sight."""
+        """Draw the random vibration of a platform as motion along the line of sight, and add it to the motions."""
         mission, times = self.mission, self.noise_times
         line_of_sight_error = (
             phase_courses(mission, error, times, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
@@ -306,7 +331,11 @@ class _DrawnErrors:
         self._motions.append((error.owner, Course(times, shaken)))
 
     def add_phase(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the phase of an oscillator, or of the link, if it has an effect on the image."""
+        """Draw the phase of an oscillator or of the synchronisation link, and add it to the phase of the echoes.
+
+        An error without an effect on the image is omitted. Mean and slope are removed in the cases that
+        `drawn_errors` names.
+        """
         if not (error.published.spread or error.published.quadratic or error.full.displacement > 0):
             return
         series = self.factor * phase_courses(self.mission, error, self.noise_times, 1, rng)[0]
@@ -318,7 +347,7 @@ class _DrawnErrors:
 
     @property
     def errors(self) -> Errors:
-        """All time series as errors of an image."""
+        """Combine all time series into the errors that the simulator applies to an image."""
         times, noise_times = self.times, self.noise_times
         # All motions are sampled as finely as the finest.
         course_times = max((course.times for _, course in self._motions), key=len, default=times)
@@ -353,7 +382,7 @@ _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
 def _biased(order: int) -> _Draw:
-    """Return a function that draws the position error caused by a constant bias, and the tilt caused by the bias.
+    """Return a function that draws a constant bias, and gives the position error and the tilt that the bias causes.
 
     The position error is the bias times τⁿ/n!, with n = `order`. The tilt is the bias times τ^(n−2).
     """
@@ -423,10 +452,11 @@ def phase_courses(
     rng: np.random.Generator,
     highest: float = math.inf,
 ) -> Floats:
-    """Random phases of one oscillator, or of the link, at the centre frequency, for one sigma, (draws, times). [rad]
+    """Draw the phases at the centre frequency that a random error causes, for one sigma, (draws, times). [rad]
 
-    For an oscillator, `declared` is a factor on its amplitude. `times` are evenly spaced over the aperture. Tones
-    above `highest` [Hz] may be omitted if no exchange of pulses folds them.
+    The error is that of an oscillator or of the synchronisation link, or a vibration. For the noise of an oscillator,
+    `declared` of the error is a factor on the amplitude. `times` are evenly spaced over the aperture. [s] Tones above
+    `highest` [Hz] may be omitted if pulse exchanges do not fold them to lower frequencies.
     """
     return error.kind.find_in(_PHASE_DRAWS, error.subject.axis)(mission, error, times, draws, rng, highest)
 
@@ -434,7 +464,11 @@ def phase_courses(
 def _link_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, _highest: float
 ) -> Floats:
-    """Phases by the errors of the exchanges of pulses; independent at all times without a stated interval."""
+    """Draw the phases that measurement errors of pulse exchanges cause, for one sigma, (draws, times). [rad]
+
+    Between exchanges the phase is interpolated linearly. If no exchange interval is stated, the phases are
+    independent at all times.
+    """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     if sync is None or sync.interval is None:
@@ -451,7 +485,7 @@ def _link_phases(
 def _vibration_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Phases by the random vibration of a platform, along the line of sight."""
+    """Draw the phases caused by random vibration of a platform along the line of sight, (draws, times). [rad]"""
     pieces = _below(pieces_of_vibration(mission, error.owner), highest)
     return (error.declared or 0.0) * _Tones(pieces, mission.collection.aperture_time).at(times, draws, rng)
 
@@ -459,7 +493,11 @@ def _vibration_phases(
 def _oscillator_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Phases of an oscillator by its own noise, and by spurs that exchanges of pulses fold to low frequencies."""
+    """Draw the phases of an oscillator that its own noise causes, (draws, times). [rad]
+
+    Spurs are included if pulse exchanges fold them to low frequencies. If the oscillator is set before the aperture
+    and then runs freely, the error of the setting is included.
+    """
     sync, T, size = mission.synchronization, mission.collection.aperture_time, error.declared or 0.0
     pieces = noise_in_case(mission, error.owner).pieces
     spurs = [(float(spur.free), spur.left) for spur in spurs_of(mission) if spur.name == error.owner]
@@ -479,7 +517,11 @@ def _oscillator_phases(
 def _acceleration_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Phases of an oscillator under acceleration: by random vibration, slow tones, and turns of the platform."""
+    """Draw the phases of an oscillator that acceleration of its platform causes, for one sigma, (draws, times). [rad]
+
+    The acceleration is that of random vibration, of slow vibration tones and of turns of the platform. Faster tones
+    are included if pulse exchanges fold them to low frequencies.
+    """
     T, size = mission.collection.aperture_time, (error.declared or 0.0) / mission.allocation.coverage_factor
     pieces, turn_phase = pieces_by_acceleration(mission, error.owner), _TurnPhase(mission, error.owner)
     turn_phases = [turn_phase.draw(rng) for _ in range(draws)]
@@ -518,10 +560,11 @@ def _linked_phases(
     highest: float,
     turn_phases: Sequence[Callable[[Floats], Floats]] = (),
 ) -> Floats | None:
-    """Phases of a unit error of an oscillator that a link leaves, (draws, times); None without a link. [rad]
+    """Draw the phases of an oscillator that remain after a link corrects a unit error, (draws, times). [rad]
 
-    The link exchanges pulses at a stated interval, or the receiver hears the transmitter directly. `tones` are tones
-    of the oscillator, each with its amplitude without a link, and what the exchanges leave of it.
+    The link exchanges pulses at a stated interval, or the receiver uses the direct signal of the transmitter. The
+    result is None without such a link. `tones` are tones of the oscillator. Each is a pair of its amplitude without a
+    link and the tones that remain of it after the exchanges.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     if sync is None:
@@ -551,11 +594,12 @@ def _between_exchanges(
     rng: np.random.Generator,
     turn_phases: Sequence[Callable[[Floats], Floats]] = (),
 ) -> Floats:
-    """Phases minus the straight lines between their values at exchanges of pulses, (draws, times). [rad]
+    """Draw phases, and subtract the straight lines between their values at pulse exchanges, (draws, times). [rad]
 
-    The tones are periodic in a whole number of exchange intervals. Both the exchanges and the moments at which the
-    phase is sampled then divide the period evenly. To achieve this, the times between the moments are scaled. The
-    scale differs from 1 by less than the ratio of the spacing of the moments to the period.
+    The period of the tones is a whole number of exchange intervals. The spacing of `times` is scaled slightly, so
+    that it also divides the period evenly. The scale differs from 1 by less than the ratio of the spacing to the
+    period.
+    `turn_phases`, if not empty, are further phases as functions of slow time, one function for each draw.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -585,17 +629,17 @@ def _between_exchanges(
 
 
 def _below(pieces: tuple[PowerLawPiece, ...], highest: float) -> tuple[PowerLawPiece, ...]:
-    """Select the part of a spectrum below a frequency."""
+    """Select the part of a power-law spectrum below the frequency `highest`. [Hz]"""
     return tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
 
 
 def _above(pieces: tuple[PowerLawPiece, ...], lowest: float) -> tuple[PowerLawPiece, ...]:
-    """Select the part of a spectrum above a frequency."""
+    """Select the part of a power-law spectrum above the frequency `lowest`. [Hz]"""
     return tuple(piece._replace(low=max(piece.low, lowest)) for piece in pieces if piece.high > lowest)
 
 
 def _fastest(mission: Mission, error: RandomError) -> float:
-    """Highest frequency in the spectrum of an error, or 0 if it has no spectrum. [Hz]"""
+    """Highest frequency in the noise or vibration spectrum of an error, or 0 if the error has no spectrum. [Hz]"""
     highest_of_noise = max((piece.high for piece in error.noise.pieces), default=0.0) if error.noise else 0.0
     return max(highest_of_noise, fastest_shake(mission, error))
 
@@ -609,12 +653,18 @@ def fastest_shake(mission: Mission, error: RandomError) -> float:
 
 
 def slowest_shake(mission: Mission, error: RandomError) -> float:
-    """Lowest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]"""
+    """Lowest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]
+
+    The result is 0 for any other error.
+    """
     return min((piece.low for piece in _shake_pieces(mission, error)), default=0.0)
 
 
 def _shake_pieces(mission: Mission, error: RandomError) -> tuple[PowerLawPiece, ...]:
-    """Phase spectrum that vibration causes, directly or through an oscillator; empty for any other error."""
+    """Pieces of the phase spectrum that a vibration causes, directly or through an oscillator.
+
+    The result is empty for any other error.
+    """
     pieces_of = _SHAKES.get(f"{error.kind.name}.{error.subject.axis}")
     return () if pieces_of is None else pieces_of(mission, error.owner)
 
@@ -627,10 +677,10 @@ _SHAKES: Mapping[str, Callable[[Mission, str], tuple[PowerLawPiece, ...]]] = {
 
 
 def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Sinusoidal motions of a platform that give the same phases as the tones of its vibrating oscillator.
+    """Sinusoidal motions of a platform that cause the same phases as the tones of its vibrating oscillator.
 
-    Only tones of at least one cycle per aperture are included; slower tones are drawn by `phase_courses`. The tones
-    differ in phase by a quarter of a cycle from the vibration that causes them.
+    Only tones with at least one cycle per aperture are included. Slower tones are drawn by `phase_courses`. A tone
+    differs in phase by a quarter of a cycle from the vibration that causes it.
     """
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
@@ -649,7 +699,11 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
 
 
 def _folded_tones(tones: Sequence[tuple[float, LeftTone]], aperture_time: float) -> list[tuple[float, float]]:
-    """Oscillator tones that exchanges of pulses fold to low frequencies: frequencies [Hz] and amplitudes per unit."""
+    """Frequencies [Hz] and amplitudes of the slow tones that remain of oscillator tones after pulse exchanges.
+
+    Pulse exchanges fold fast tones to low frequencies. `tones` are pairs of the amplitude of a tone without exchanges
+    and the tones that remain of it. The amplitudes are those of a unit error.
+    """
     return [
         (float(frequency), free * float(share))
         for free, residual in tones
@@ -659,10 +713,10 @@ def _folded_tones(tones: Sequence[tuple[float, LeftTone]], aperture_time: float)
 
 
 class _TurnPhase:
-    """Random phase of an oscillator from slow vibration and from the turns of its platform, per unit of sensitivity.
+    """Random oscillator phase due to slow vibration and turns of the platform, per unit of acceleration sensitivity.
 
-    All directions of the sensitivity are equally likely, and so are all phases of a tone. One sigma is the effect in
-    the direction with the largest effect.
+    All directions of the sensitivity are equally likely, and so are all phases of a vibration tone. The standard
+    deviation of the effect of a turn is its effect in the most sensitive direction.
     """
 
     def __init__(self, mission: Mission, name: str) -> None:
@@ -678,7 +732,7 @@ class _TurnPhase:
         ]
 
     def draw(self, rng: np.random.Generator) -> Callable[[Floats], Floats]:
-        """Draw one random phase, as a function of slow times. [rad]"""
+        """Draw a random phase, returned as a function that gives the phase [rad] at slow times [s]."""
         direction, starts = rng.standard_normal(3), rng.uniform(0, 2 * math.pi, len(self.slow))
 
         def at(times: Floats) -> Floats:
@@ -693,7 +747,10 @@ class _TurnPhase:
 
 
 def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
-    """Times of exchanges of pulses, with a random start, that enclose all given times. [s]"""
+    """Times of pulse exchanges at a given interval, from before the first to after the last of `times`. [s]
+
+    The time of the first exchange is random.
+    """
     start = float(times.min()) - interval * float(rng.random())
     knots: Floats = np.arange(start, float(times.max()) + interval, interval)
     return knots
@@ -706,9 +763,9 @@ def _cosines_and_sines(frequency: Floats, times: Floats) -> tuple[Floats, Floats
 
 
 def _phasors(turns: float, count: int) -> Complexes:
-    """Phasors exp(2πi·n·turns) for n = 1 … `count`, (count,).
+    """Phasors exp(2πi·n·turns) of the harmonics n = 1 … `count`, (count,).
 
-    They are the phasors of the harmonics n at a time at which the fundamental has completed `turns` cycles.
+    They apply at the time at which the fundamental has completed `turns` cycles.
     """
     side = math.isqrt(count) + 1
     coarse = np.exp(2j * math.pi * turns * np.arange(side + 1) * side)
@@ -720,9 +777,9 @@ Summed = TypeVar("Summed", np.float64, np.complex128)
 
 
 def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
-    """Sum the values of harmonics 1, 2 … that alias to the same harmonic, (count,).
+    """Sum the values of harmonics 1, 2 … that alias to the same harmonic of 0 … count - 1, (count,).
 
-    These harmonics coincide at `count` evenly spaced moments of the period.
+    Such harmonics are equal at `count` evenly spaced times of the period.
     """
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
@@ -731,7 +788,7 @@ def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
 
 
 def fast_steps(least: int) -> int:
-    """Small number of steps that suits a Fourier transform, at least `least` and at most a sixteenth more."""
+    """Number of samples for which an FFT is fast: at least `least`, and larger by at most a sixteenth."""
     unit = 1 << max(0, least.bit_length() - 5)
     return -(-least // unit) * unit
 
@@ -746,13 +803,12 @@ def tones_at(amplitudes: Complexes, count: int) -> Floats:
 
 
 def powers_at(powers: Floats, count: int) -> Floats:
-    """Powers of harmonics 0 … count / 2 that replace harmonics 1, 2 … of random phase at `count` moments.
+    """Powers of the harmonics 0 … count // 2 that represent harmonics 1, 2 … at `count` samples, (count // 2 + 1,).
 
-    The covariance at these moments is the same.
-
-    The phase of harmonic k at moment n is 2πkn/count. Harmonic k + count has the same phase. Harmonic count − k has
-    the opposite phase, which does not differ if the phase is random. The powers of these harmonics are therefore
-    added.
+    The harmonics have random phases and the given powers. The samples are evenly spaced over the period, and keep
+    their covariance. The phase of harmonic k at sample n is 2πkn/count. Harmonic k + count has the same phase.
+    Harmonic count − k has the opposite phase, which makes no difference if the phases are random. The powers of these
+    harmonics are therefore added.
     """
     folded = _folded(powers, count)
     one_sided: Floats = folded[: count // 2 + 1].copy()
@@ -761,11 +817,13 @@ def powers_at(powers: Floats, count: int) -> Floats:
 
 
 class _Tones:
-    """Spectrum as a set of tones: fast tones at equal steps of frequency, slow tones at logarithmic steps.
+    """Tones that represent a phase spectrum: fast tones in equal frequency steps, slow tones in finer steps.
 
-    Fast tones complete cycles within the aperture, and repeat after `period` [s]. A narrow piece of the spectrum
-    contains few fast tones. It gets additional tones, which follow the slow tones in the arrays. Noise at frequencies
-    above those of the fast tones is independent at each time. Its standard deviation is `rest`.
+    Fast tones are the harmonics of 1/`period`, where `period` [s] is by default four apertures. Slow tones have lower
+    frequencies, in logarithmic steps unless the edges `slow` of their frequency intervals [Hz] are given. A narrow
+    piece of the spectrum would contain few fast tones. It is represented by tones of its own, which follow the slow
+    tones in the arrays. Noise at frequencies above those of the fast tones is independent at each time, with the
+    standard deviation `rest`. [rad]
     """
 
     def __init__(
@@ -802,12 +860,18 @@ class _Tones:
         self.rest = math.sqrt(math.fsum(beyond))
 
     def draw_slow(self, draws: int, rng: np.random.Generator) -> Floats:
-        """Draw random amplitudes of the cosine and sine of each slow tone, (2, draws, tones)."""
+        """Draw random amplitudes of the cosine and the sine of each slow tone, (2, draws, tones). [rad]
+
+        Tones of narrow pieces of the spectrum are included.
+        """
         drawn: Floats = rng.standard_normal((2, draws, self.slow.size)) * self.slow_size
         return drawn
 
     def slow_at(self, times: Floats, drawn: Floats) -> Floats:
-        """Sums of the slow tones and the tones of narrow pieces, with the drawn amplitudes, (draws, times). [rad]"""
+        """Sums of the slow tones and the tones of narrow pieces at given times, (draws, times). [rad]
+
+        `drawn` are the amplitudes from `draw_slow`.
+        """
         coarse_times = times if times.size <= _COURSE_SAMPLES else np.linspace(times[0], times[-1], _COURSE_SAMPLES)
         cosines, sines = _cosines_and_sines(self.slow[: self.count], coarse_times)
         sums: Floats = drawn[0, :, : self.count] @ cosines.T + drawn[1, :, : self.count] @ sines.T
@@ -819,9 +883,10 @@ class _Tones:
         return sums
 
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Random sums of the fast tones at times that divide their period evenly, (draws, times). [rad]
+        """Draw sums of the fast tones and of the noise above them, at evenly spaced times, (draws, times). [rad]
 
-        If `later` [s] is given, the result is the change of the sum during that time, as in `at`.
+        The spacing of the times must divide the period of the tones evenly. If `later` [s] is given, the result is
+        the change of the sum from each time to the time `later` after it.
         """
         count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
         square, white_variance = np.square(self.fast_size), self.rest**2
@@ -840,9 +905,9 @@ class _Tones:
         return sums
 
     def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Random sums of all tones at evenly spaced times, (draws, times). [rad]
+        """Draw sums of all tones at evenly spaced times, (draws, times). [rad]
 
-        If `later` [s] is given, the result is the change of the sum during that time.
+        If `later` [s] is given, the result is the change of the sum from each time to the time `later` after it.
         """
         slow = self.draw_slow(draws, rng)
         sums = self.slow_at(times, slow)
@@ -852,11 +917,11 @@ class _Tones:
 
 
 class _Setting:
-    """Setting of a clock before the aperture: a line is fitted to its phase over an averaging time.
+    """Setting of a clock before the aperture, by a straight line fitted to its phase over an averaging time.
 
-    The slow tones of the averaging time and of the aperture are the same. Tones that are faster than one cycle per
-    eight apertures, and that complete two dozen cycles within the age of the setting, are drawn independently for the
-    averaging time.
+    The middle of the averaging time is earlier than mid-aperture by `age`. [s] Slow tones are common to the averaging
+    time and the aperture. Tones are drawn independently for the averaging time if they are faster than a cycle per
+    eight apertures and complete more than two dozen cycles within the age of the setting.
     """
 
     def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, age: float, averaging: float) -> None:
@@ -875,9 +940,9 @@ class _Setting:
         self.fast = _Tones(fast_pieces, averaging) if fast_pieces else None
 
     def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """Values of the fitted lines at slow times within the aperture, (draws, times). [rad]
+        """Phases in the aperture on the straight lines fitted over the averaging time, (draws, times). [rad]
 
-        `slow` are the drawn amplitudes of the slow tones.
+        `slow` are the amplitudes of the slow tones that `_Tones.draw_slow` has drawn.
         """
         lines = self.of_cosine @ slow[0].T + self.of_sine @ slow[1].T
         if self.fast is not None:
@@ -887,5 +952,5 @@ class _Setting:
 
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:
-    """Clock error that corresponds to a phase at the centre frequency. [s]"""
+    """Clock error [s] that causes a given phase at the centre frequency. [rad]"""
     return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT_MPS)

@@ -24,7 +24,10 @@ _MAX_LIST_BYTES = 1 << 20
 
 
 class Target(NamedTuple):
-    """Point target on the ground: east and north of the scene centre [m], and power relative to amplitude 1. [dB]"""
+    """Point target on the ground, with its position relative to the scene centre and its power.
+
+    `east` and `north` are in metres. `level_db` is the power relative to that of a point of amplitude 1. [dB]
+    """
 
     east: float = 0.0
     north: float = 0.0
@@ -34,7 +37,7 @@ class Target(NamedTuple):
 class Targets(NamedTuple):
     """Point targets of a scene, and the level of its clutter.
 
-    The level is the mean power of a pixel relative to a point of 0 dB [dB], or None without clutter.
+    The level is the mean power of a pixel relative to the peak of a point of 0 dB. [dB] It is None without clutter.
     """
 
     points: tuple[Target, ...] = (Target(),)
@@ -44,9 +47,9 @@ class Targets(NamedTuple):
 def parse_targets(text: str) -> Targets:
     """Read targets from `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, `grid:3x3:50 m`, or the name of a file.
 
-    Entries are points, grids about the scene centre, and at most one clutter level, in the units of a mission file;
-    bare numbers are metres and decibels. An entry that ends in .csv names a file with the columns east [m],
-    north [m], amplitude.
+    Entries are separated by semicolons. They are points, grids centred at the scene centre, and at most one clutter
+    level, with the units of a mission file. Numbers without a unit are in metres or decibels. An entry that ends in
+    .csv is the name of a file with the columns east [m], north [m], amplitude.
 
     Raises
     ------
@@ -83,7 +86,10 @@ def parse_targets(text: str) -> Targets:
 
 
 def _grid(entry: str) -> Iterator[Target]:
-    """Points of equal power in a grid about the scene centre, from an entry `grid:NXxNY:SPACING`."""
+    """Yield points of 0 dB in a grid centred at the scene centre, from an entry `grid:NXxNY:SPACING`.
+
+    NX and NY are the numbers of points to the east and to the north.
+    """
     match = _GRID_PATTERN.fullmatch(entry)
     if match is None:
         raise ValueError(f"{entry!r} is no grid; accepted: {_ACCEPTED_FORMS}")
@@ -97,9 +103,9 @@ def _grid(entry: str) -> Iterator[Target]:
 
 
 def read_list(file: str) -> list[Target]:
-    """Read points from a CSV file.
+    """Read points from a CSV file with the columns east [m], north [m], amplitude.
 
-    A `ValueError` names the file and the line that is not a point.
+    If the file cannot be read or a line is not a point, a `ValueError` names the file, the line and the reason.
     """
     try:
         data = DISK.content(file, _MAX_LIST_BYTES)

@@ -1,11 +1,11 @@
-"""Phase of an error over the aperture, measured in a small image of a point target (a chip).
+"""Measures the phase of an error over the aperture in a small image of a point target (a chip).
 
 The contribution of each pulse to each pixel follows from exact ranges along the measured paths. The phase over the
-aperture is modelled as a polynomial, which is fitted to the pixels. In this way the model also includes the ends of
-the patch, where a finite image cuts off sidelobes. The fit starts from the effect that exact ranges predict. The
-residual of the fit shows whether the polynomial describes the image. If it does not, the image is correlated with the
-contribution of each pulse, which gives the phase of the pulse. This corresponds to a projection of the image spectrum
-to slow time, including range walk and curved lines of equal range. The error-free response is formed and measured
+aperture is modelled as a polynomial. The polynomial is fitted to the pixels themselves, so sidelobes that the finite
+image cuts off cause no error. The fit starts from the effect that exact ranges predict. The residual of the fit shows
+whether the polynomial describes the image. If it does not, the image is correlated with the contribution of each
+pulse, which gives the phase of the pulse. This correlation corresponds to a projection of the image spectrum to slow
+time. It takes range walk and curved lines of equal range into account. The error-free response is formed and measured
 with the same paths, so that effects common to both responses cancel.
 """
 
@@ -53,13 +53,13 @@ _KERNEL_CELLS = np.linspace(0, 64, 4097)  # range cells of a tapered range respo
 
 
 class ApertureReading(NamedTuple):
-    """Phases of a response at the edge of the aperture [rad], with the sign of the range error.
+    """Quadratic and cubic phase of a response at the edge of the aperture [rad], with the sign of the range error.
 
-    `across_pixels` is the offset of the response along y′ from the middle of the image, which follows from the linear
-    part of the phase. `walked_pixels` is the offset of its centre of gravity along x′, which follows from the other
-    parts of the phase: at each frequency along y′, the response lies at the range error minus its slope times slow
-    time. `coverage` is the fraction of the aperture that the patch contains. It is 1 unless the smeared response
-    leaves the patch.
+    `across_pixels` is the offset of the response along y′ from the middle of the image. It follows from the linear
+    part of the phase. `walked_pixels` is the offset of the response's centre of gravity along x′ that the quadratic
+    part and higher parts of the phase cause. The part of the response that a slow time contributes lies, in range, at
+    the range error minus the product of its slope and the slow time. `coverage` is the fraction of the aperture that
+    the patch contains. It is 1 unless the smeared response leaves the patch.
     """
 
     quadratic: float
@@ -78,7 +78,7 @@ def read_aperture(
     half_lines: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
-    """Measure the quadratic and cubic phase of a response in its image.
+    """Measure the quadratic and cubic phase over the aperture in the image of a point target with errors.
 
     Parameters
     ----------
@@ -89,10 +89,11 @@ def read_aperture(
     chip, reference : Chip
         Images with and without errors, on the same pixels.
     half_lines : int
-        Number of additional lines to use on either side of the middle line.
+        Largest distance of a used line from the middle line. Every second line is used. With 0, only the middle line
+        is used. [lines]
     expected : ExactEffect, optional
-        Predicted effect, from which the fit starts. If no polynomial near it fits the pixels, the phases of single
-        pulses are tried too.
+        Predicted effect, from which the fit starts. If it is omitted, or if no polynomial near it fits the pixels, a
+        fit starts from the phases of single pulses.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def read_aperture(
 
 
 class _Pixels:
-    """Pixels (n, 3) of an image [m], and the contribution of each pulse to them for a given point target."""
+    """Pixels of an image, at positions (n, 3) [m], and the contributions of pulses to them for a point target."""
 
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
@@ -154,7 +155,7 @@ class _Pixels:
         """Compute the contributions of pulses (m,) to the pixels (n,) at baseband, (m, n).
 
         `slow_time` (m,) are the times of the pulses [s]. `remaining_range` (m,) is a range error that moves the range
-        responses without changing the phase [m].
+        responses without changing the phase [m]. If it is None, the range responses are not moved.
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
@@ -248,9 +249,9 @@ def _fit_to_pulses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """Legendre coefficients `fit` of a phase polynomial [rad].
+    """Phase polynomial that is fitted to an image, with Legendre coefficients `fit` over the aperture [rad].
 
-    `misfit` is the norm of the fit's residual divided by the norm of the image.
+    `misfit` is the norm of the residual of the fit divided by the norm of the image.
     """
 
     fit: Floats
@@ -258,7 +259,10 @@ class _Refined:
 
 
 class _Fitting:
-    """Fits phase polynomials to the pixels of an image. In a large image only a selection of the pixels is used."""
+    """Fits phase polynomials over the aperture to the pixels of an image.
+
+    In a large image only every n-th pixel is used, so that the computation fits into memory.
+    """
 
     def __init__(
         self,
@@ -278,9 +282,10 @@ class _Fitting:
         self.gain = complex(np.vdot(at_rest, clean) / np.vdot(at_rest, at_rest))
 
     def refined(self, fit: Floats) -> _Refined:
-        """Refine the coefficients of a polynomial. With range walk there are several rounds.
+        """Refine a phase polynomial, given by its Legendre coefficients `fit` [rad], by fitting it to the pixels.
 
-        Each round uses the range walk of the previous fit.
+        A fit uses the range walk that follows from the coefficients at its start. If several image lines are used,
+        the fit is done twice. The second fit then uses the range walk that the first fit gives.
         """
         collection = self.fitted_pixels.collection
         scaled_time = 2 * self.slow_time / collection.aperture_time
@@ -295,7 +300,12 @@ class _Fitting:
 
 
 def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: Complexes, gain: complex) -> _Refined:
-    """Fit the phase polynomial to the pixels by Gauss-Newton steps. A step that gives no improvement is halved."""
+    """Fit a phase polynomial to the pixels of an image by Gauss-Newton steps.
+
+    The steps start from the Legendre coefficients `fit` [rad]. A step that does not reduce the residual is halved.
+    `contribution` are the contributions of the pulses to the pixels, (pulses, pixels). `gain` is the complex
+    amplitude of the error-free response.
+    """
     legendre = np.polynomial.legendre.legvander(scaled_time, fit.size - 1)
     norm = float(np.linalg.norm(image))
 
@@ -333,7 +343,8 @@ def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: C
 class Shift:
     """Displacement of a response on the ground (east, north) [m], and azimuth of its smear line, 0 to π [rad].
 
-    `pixels` is the displacement along x′ and y′ of the image.
+    The smear line is the line along which the response is smeared. `pixels` is the same displacement along x′ and y′
+    of the image. [pixels]
     """
 
     displacement: GroundVector
@@ -344,13 +355,14 @@ class Shift:
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
     """Measure the displacement of a response from an error-free response on the same grid, and its smear line.
 
-    The displacement is the distance between the two peaks. If the response is smeared so much that it has no single
-    peak, the displacement follows from a `reading` of its aperture. Along y′ it then follows from the slope of the
-    phase. Along x′ it is the centre of gravity minus the offset that the other parts of the phase cause.
+    Without a `reading`, the displacement is the vector between the two peaks. A response that is smeared too much has
+    no single peak. For such a response, `reading` gives the phase over its aperture. The displacement along y′ then
+    follows from the slope of the phase. The displacement along x′ is the centre of gravity minus the offset that the
+    quadratic part and higher parts of the phase cause.
 
     Each part of the aperture displaces the point differently, as in (26) to (28) of Rigling & Moses for three parts.
-    In the spectrum of the image, the displacement is the gradient of the phase relative to an error-free response,
-    and the spread of the displacements is the smear. This also measures a smear that is far smaller than a resolution
+    These displacements follow from the spectrum of the image. They are the gradient of its phase relative to an
+    error-free response. Their spread is the smear. This method also measures a smear far smaller than a resolution
     cell, which is not yet visible in the shape of the response.
 
     Raises
@@ -390,7 +402,10 @@ def _step(product: Complexes, axis: int) -> Floats:
 
 
 def _pixel_vectors(grid: Floats) -> Floats:
-    """Ground vectors of one pixel along x′ and y′ at the middle of the grid, as columns (east, north), (2, 2). [m]"""
+    """Ground vectors from pixel to pixel along x′ and y′ at the middle of the grid, (2, 2). [m]
+
+    The vectors are the columns of the matrix, with the components east and north.
+    """
     i, j = grid.shape[0] // 2, grid.shape[1] // 2
     columns = (grid[i + 1, j] - grid[i - 1, j], grid[i, j + 1] - grid[i, j - 1])
     vectors: Floats = np.stack([column[:2] / 2 for column in columns], axis=1)
@@ -406,14 +421,22 @@ def refocused(
     algorithm: Callable[[Complexes], Focused],
     half_lines: int,
 ) -> Chip:
-    """Estimate one phase over the aperture from the middle lines of a chip, and remove it from all lines.
+    """Estimate the phase error over the aperture from the middle lines of a chip, and remove it from all lines.
 
-    Along a line of equal range, each pulse has its own frequency by the measured paths. Over a long aperture, or if
-    the range and Doppler gradients are nearly parallel, equal time intervals occupy unequal parts of the band. A
-    quadratic phase in time is then not quadratic in frequency, and an estimate in frequency would lose the part of
-    the aperture that is compressed into a few per cent of the band. Therefore the spectra of the lines are sampled at
-    equal time steps, the phase is estimated there, and then transferred back to the frequencies. The estimate uses
-    `half_lines` lines on either side of the middle line.
+    The autofocus function `algorithm` makes the estimate from the middle line and from `half_lines` lines on either
+    side of it.
+
+    Along a line of equal range, each pulse has its own spatial frequency, which follows from the measured paths. Over
+    a long aperture, or if the range and Doppler gradients are nearly parallel, equal time intervals occupy unequal
+    parts of the band. A quadratic phase in time is then not quadratic in frequency. An estimate in frequency would
+    lose the part of the aperture that is compressed into a few per cent of the band. Therefore the spectra of the
+    lines are sampled at equal time steps. The phase is estimated at these times, and then converted to the
+    frequencies of the image.
+
+    Raises
+    ------
+    ValueError
+        The frequency does not change in one direction over the aperture.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING_FACTOR)))
@@ -445,7 +468,10 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse at the centre of the middle line, relative to the carrier, (times,). [cycles/pixel]"""
+    """Spatial frequency of each pulse along the middle line of a chip, (times,). [cycles/pixel]
+
+    It is computed at the centre of the line. The spatial frequency of the removed carrier phase is subtracted.
+    """
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)

@@ -65,9 +65,10 @@ def verify_mission(
 ) -> VerifiedMission:
     """Verify every limit of a mission whose row id matches the glob pattern `only`.
 
-    The verdicts are in the order of `check`, including the vibration of both platforms together. They do not depend
-    on `jobs`, the number of processes. After each row `progress` is called with the number of finished rows and the
-    number of all rows. `mapped` computes the rows on remote workers instead of in processes on this machine.
+    The verdicts are in the order of the rows of `check`. They include the vibration of both platforms together. They
+    do not depend on `jobs`, the number of processes. After each row `progress` is called with the number of finished
+    rows and the number of all rows. `mapped`, if given, is a function that computes the rows on remote workers
+    instead of in processes on this machine.
     """
     mission = mission._replace(places={})  # the places of keys cannot be sent to a process and are not needed
     all_cases = cases(Study(mission), only)
@@ -97,14 +98,18 @@ def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
 
 
 def cases(study: Study, only: str = "*") -> dict[str, Case]:
-    """Map the row ids that match a glob pattern to functions that verify these rows, in the order of `check`."""
+    """Map each row id that matches the glob pattern `only` to a function that verifies the row.
+
+    The ids are in the order of the rows of `check`.
+    """
     return {row_id: case for row_id, case in _cases(study) if fnmatchcase(row_id, only)}
 
 
 def _warns_of_the_total(study: Study) -> bool:
-    """Whether the check has a row for the mission's quadratic phase under `combine: each`.
+    """Whether `check` has a row for the mission's total quadratic phase under the rule `combine: each`.
 
-    The row exists as a warning if all errors together exceed the total.
+    `check` adds this row, as a warning, if the root-sum-square of all errors exceeds the mission's limit on quadratic
+    phase although no single error exceeds it.
     """
     aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
     rows = (row for model in study.models for row in aggregates.rows(model.name))
@@ -117,7 +122,7 @@ def _verify_row(mission: Mission, row_id: str) -> Verdict:
 
 
 def _conditions(mission: Mission) -> Iterator[str]:
-    """Yield texts that describe the conditions of the images, and the keys of the file that are ignored."""
+    """Yield phrases that state how the images are formed, and which keys of the mission file do not affect them."""
     settings = mission.simulation or Simulation()
     yield f"one point, exact ranges, {settings.window} window"
     yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
@@ -126,12 +131,16 @@ def _conditions(mission: Mission) -> Iterator[str]:
 
 
 def _order(vibration: Subject) -> tuple[int, int]:
-    """Sort key for the vibrations of a platform in the order of `check`: lines, groups of lines, noise."""
+    """Sort key that orders the vibrations of an owner as in `check`: single tones, groups of tones, noise."""
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(vibration.axis), vibration.entry or 0)
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Yield the ids and verifying functions of the limited rows of random errors, tones and spread power."""
+    """Yield the id and the verifying function of each row of sensors, clocks and sidelobes that has a limit.
+
+    These are the rows of random errors, of errors that the file states by their ISLR, of oscillator tones, of PSLR,
+    and of ISLR.
+    """
     for error in study.analysis.random:
         sizes = limits_of(study, error)
         if sizes and error.kind.moves == "image":
@@ -228,17 +237,21 @@ class _Sizes(PointCollection):
         raise _NotFormedError(f"{count} weights are not needed")
 
     def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CUT_CELLS, **_: object) -> Chip:
-        """Record the size of one of two images of a single line; raises `_NotFormedError` instead of forming it."""
+        """Record the size of an image that is a single line, and raise `_NotFormedError` instead of forming it.
+
+        The recorded size also includes the second image of the same size with which the image would be compared.
+        """
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))
         raise _NotFormedError("its size is known")
 
 
 def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """Estimate the time [s] that `verify_mission` will take; 0 if it is far below a minute.
+    """Estimate the time that `verify_mission` will take. [s]
 
     The time per pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. It is
-    therefore measured on a small and a larger image of the mission, unless all images are clearly small.
+    therefore measured on a small and a larger image of the mission. If all images together certainly take less than a
+    minute, no time is measured, and the result is 0. It is also 0 if hardly any image can be formed.
     """
     mission = mission._replace(places={})
     study = Study(mission)
@@ -267,12 +280,12 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
 
 
 def _size(cells: int, range_cells: int) -> float:
-    """Cost of forming an image (pixels times pulses), relative to the smallest image."""
+    """Cost of forming an image, the product of pixels and pulses, relative to the cost of the smallest image."""
     return cells * range_cells * pulses_for(cells) / (CUT_CELLS * RANGE_CELLS * pulses_for(CUT_CELLS))
 
 
 def _seconds(study: Study, cells: int) -> float:
-    """Measure the time to form and read two images without error. [s]"""
+    """Measure the time that it takes to form two error-free images and to read their phase over the aperture. [s]"""
     errors, start_time = Errors(), time.perf_counter()
     effect = study.collection.effect(errors)
     chips = study.collection.pair(errors, effect.displacement, cells)
@@ -282,9 +295,10 @@ def _seconds(study: Study, cells: int) -> float:
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form images for the most important rows of a verified mission; empty if no row has an image.
+    """Form the images that a report shows for the most important rows of a verified mission.
 
-    The worst row comes first. `findings` must contain the verdicts of the images.
+    The worst row comes first. The result is empty if no row has an image. `findings` must contain the verdicts of the
+    images.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:
@@ -312,7 +326,10 @@ def _shown(images: Responses) -> PointImage:
 
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
-    """Crop a chip to the pixels that a report shows: the smeared response and its sidelobes."""
+    """Convert a chip to the picture that a report shows: the smeared response with its sidelobes, and its cut.
+
+    `smear_cells` is the length of the smear in resolution cells.
+    """
     spacing, middle = chip.spacing, chip.image.shape[1] // 2
     reach = _MARGIN_AROUND_SMEAR_CELLS + smear_cells / 2
     half = min(math.ceil(reach * OVERSAMPLING_FACTOR), middle - 1)

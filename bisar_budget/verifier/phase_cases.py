@@ -28,9 +28,10 @@ _MAX_SMEAR_CELLS = 64  # with a longer smear, images are formed only at the limi
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
-    """Verify the limit on the size of one error that its quadratic phase sets, with and without autofocus.
+    """Verify the limit that the quadratic phase sets on the size of one error, with and without autofocus.
 
-    If no size reaches this limit, the limit that the cubic phase or the location sets is verified instead.
+    If the quadratic phase of the error never reaches the budget, the limit that the cubic phase or the location sets
+    is verified instead.
     """
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
@@ -45,10 +46,11 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 
 
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
-    """Verify the limit on a vibration below one cycle per aperture.
+    """Verify the limit on the quadratic phase of a vibration with less than one cycle per aperture.
 
-    Each of its axes vibrates alone, with its worst starting phase. For a vibration along several axes, the amplitudes
-    are scaled until the sum of their phases, computed from exact ranges, reaches the limit.
+    An image is formed for the vibration along each of its axes alone, with the worst starting phase. The phases
+    measured in these images are added. For a vibration along several axes, the amplitudes are scaled until the sum of
+    the phases computed from exact ranges reaches the limit.
     """
     name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)
     mission, tone = study.mission, study.analysis.slow_tones[vibration.id]
@@ -82,14 +84,17 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
 
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
-    """Return the vibration with the starting phase that lowers the peak most, computed from exact ranges."""
+    """Return a vibration with the starting phase that lowers the peak most, as computed from exact ranges.
+
+    `name` is the vibrating platform, and `line` the vibration with any starting phase.
+    """
     lines = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
     candidates = [Errors().of(name, PathError(sinusoids=(shifted,))) for shifted in lines]
     return max(candidates, key=lambda errors: study.collection.effect(errors).equal_loss)
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
-    """Verify the limit that the cubic phase or the location sets on an error without a quadratic limit."""
+    """Verify the limit that the cubic phase or the location sets on an error without a limit on quadratic phase."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
     blank = study.blank(source.id, size, source.unit)
@@ -121,7 +126,11 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
-    """Verify the limit on the sum of all declared errors of an owner, with signs for which their phases add up."""
+    """Verify the limit on the sum of the quadratic phases of all declared errors of an owner.
+
+    The signs of the errors are chosen so that their phases add. The verdict is `not_evaluated` if
+    `allocation.combine` is not `sum`, or if the errors have no quadratic phase.
+    """
     budget = study.allocation.qpe_limit(owner)
     blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
@@ -133,20 +142,20 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
-    """Return a verdict without an image on an error that is stated as a phase and not as a motion."""
+    """Return the verdict `not_evaluated` for an error that the file states as a phase and not as a motion."""
     budget = study.allocation.qpe_limit(source.owner)
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=phrases.note("phase-without-motion"))
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Return a verdict without an image on an `other` error that is not stated as a quadratic phase."""
+    """Return the verdict `not_evaluated` for an `other` error that the file does not state as a quadratic phase."""
     return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
 
 def dispersion(study: Study) -> Verdict:
-    """Return a verdict without an image on dispersion, the phase of free electrons over the band.
+    """Return the verdict `not_evaluated` for dispersion, the phase that free electrons cause over the band.
 
-    The images are read over slow time and cannot show it.
+    Phases of images are measured over slow time, so the images cannot show dispersion.
     """
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
@@ -154,9 +163,9 @@ def dispersion(study: Study) -> Verdict:
 
 
 def edge(study: Study) -> Verdict:
-    """Return a verdict without an image on the phase difference between the centre and the edge of the scene.
+    """Return the verdict `not_evaluated` for the phase difference between the centre and the edge of the scene.
 
-    Only the tests compare this difference with images.
+    The images are images of the scene centre. Only the tests compare this difference with images.
     """
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
@@ -166,7 +175,7 @@ def edge(study: Study) -> Verdict:
 def cubic(study: Study, requirement: float) -> Verdict:
     """Verify the limit on the cubic phase of all declared errors together.
 
-    The errors are scaled until the cubic phase by the gating model reaches the requirement [rad].
+    The errors are scaled until their cubic phase by the gating model reaches `requirement`. [rad]
     """
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -204,10 +213,12 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
 
 
 def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
-    """Refocus the image at the limit, and compare the phase that remains with the budget without autofocus gain.
+    """Refocus an image with errors at their limit, and compare the phase that autofocus leaves with the budget.
 
-    `budget` is in [rad]. If `holds_hidden`, the remaining phase includes the phase that the band and rotations hide
-    from autofocus. It is left out if only the pull-in range is verified, because separate rows judge it.
+    `budget` is the limit on the quadratic phase without autofocus gain. [rad] If `holds_hidden`, the remaining phase
+    includes the hidden phase, which autofocus cannot estimate because of the band and rotations. The hidden phase is
+    left out if only the pull-in range is verified, because separate rows judge it. Returns the fields of the verdict
+    that concern autofocus.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -240,9 +251,9 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
 
 
 def _read_focused(study: Study, focused: Responses) -> ApertureReading:
-    """Measure the phase that remains after autofocus.
+    """Measure the phase over the aperture that remains after autofocus.
 
-    A small phase is measured in the middle of a large patch, a large phase in all of the patch.
+    A small phase is measured in the middle of the patch, and a large phase in the whole patch.
     """
     small, large = (
         focused._replace(chip=focused.chip.within(cells), reference=focused.reference.within(cells))
@@ -258,7 +269,7 @@ def _read_focused(study: Study, focused: Responses) -> ApertureReading:
 
 
 def predicted(effect: ExactEffect) -> VerdictFields:
-    """Return the fields of a verdict that are computed from exact ranges."""
+    """Return the fields of a verdict that are computed from exact ranges: phases and displacement."""
     return {
         "predicted_qpe_rad": abs(effect.quadratic),
         "equal_loss_qpe_rad": effect.equal_loss,
@@ -270,8 +281,8 @@ def predicted(effect: ExactEffect) -> VerdictFields:
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     """Return the verdict on a limit at which no image can be formed.
 
-    A limit of the published model is optimistic if no ground point has the range history. Otherwise there is no
-    verdict.
+    `error` states why no image can be formed. A limit of the published model is optimistic if no ground point has the
+    recorded range history. Otherwise the verdict is `not_evaluated`.
     """
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(verdict="optimistic", reason=phrases.note("no-image-at-the-limit"))
@@ -279,10 +290,11 @@ def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
 
 
 def compare(excess: float, tolerance: float) -> str:
-    """Return the verdict on a limit from the relative amount by which the measured phase exceeds the budget.
+    """Return the verdict on a limit from the amount by which a measured quantity exceeds its permitted value.
 
-    The verdict is `confirmed` if the amount is within the tolerance, `optimistic` if it is larger, and `conservative`
-    if it is smaller.
+    `excess` and `tolerance` are relative amounts, or both are levels in dB. The verdict is `confirmed` if the
+    magnitude of `excess` is at most `tolerance`. Otherwise it is `optimistic` if `excess` is positive, and
+    `conservative` if it is negative.
     """
     if abs(excess) <= tolerance:
         return "confirmed"
@@ -290,7 +302,10 @@ def compare(excess: float, tolerance: float) -> str:
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement that several errors together cause by (25) of the paper; None if (25) has no solution. [m]"""
+    """Displacement (east, north) that several errors together cause by (25) of the paper. [m]
+
+    `scale` multiplies the sizes of the errors. The result is None if (25) has no solution.
+    """
     published = study.analysis.published  # (25)
     moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
@@ -299,7 +314,11 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
 
 
 def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
-    """Form images with errors at the limit and beside it, and compare the equal-loss phase with the budget."""
+    """Return the verdict on a quadratic-phase limit from images with errors below, at and above the limit.
+
+    `sizes` are the errors with their sizes at the limit. The phases measured in the images are compared with the
+    budget in `blank`. If the smear is long, only the image at the limit is formed.
+    """
     budget = blank.budget_rad or 0.0
     by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
@@ -336,12 +355,13 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
 def _through_the_limit(
     inside: float | None, measured: float, beyond: float | None, budget: float
 ) -> tuple[str, Note | None]:
-    """Return the verdict on the phase at a limit, and a note if the phase does not grow with the error.
+    """Return the verdict on a limit from measured phases, and a note if the phase does not grow with the error.
 
-    `inside` and `beyond` are the phases at sizes below and above the limit; None if no image is formed there.
-    `measured` is the phase at the limit. All phases are in [rad]. A limit implies that no smaller error has more
-    phase. If the phase at the smaller size is larger, it is used for the verdict, and the limit is not confirmed.
-    Above the limit the phase may fall, which the note reports.
+    `inside`, `measured` and `beyond` are the phases with the error below, at and above its limit. [rad] `inside` and
+    `beyond` are None if no image is formed at these sizes. A limit is correct only if smaller errors have smaller
+    phases. If the phase below the limit is as large as the phase at the limit or larger, the verdict follows from the
+    phase below the limit, without a tolerance. Above the limit the phase may fall. In this case the verdict does not
+    change. The note is None if the phase grows.
     """
     verdict = compare(measured / budget - 1, TOLERANCE_FRACTION)
     falls_inside = inside is not None and inside >= measured
@@ -358,7 +378,10 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Measure a response, without the quantities that a long smear or a curved patch makes undefined."""
+    """Return the fields of a verdict that describe a response: displacement, smear, and cross-range response.
+
+    Quantities that are undefined, because the smear is long or the patch is curved, are omitted.
+    """
     chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
         shift = study.shift(images, reading)
@@ -381,7 +404,10 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> V
 
 
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
-    """Measure the equal-loss quadratic phase in the image of several errors; None without an image. [rad]"""
+    """Measure the equal-loss quadratic phase in an image that contains several errors. [rad]
+
+    `scale` multiplies the sizes of the errors. The result is None if no image can be formed or read.
+    """
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
         return study.equal_loss(images, study.read(images))
@@ -390,12 +416,14 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
-    """Find the scale of the errors at which exact ranges give the required cubic phase; `scale` is a first guess.
+    """Find the factor for all errors at which their cubic phase from exact ranges equals the requirement.
+
+    `scale` is a first guess of the factor.
 
     Raises
     ------
     ValueError
-        No scale is found: the phase exceeds the requirement where no image can be formed, or never reaches it.
+        No factor is found: the cubic phase never equals the requirement, or only where no image can be formed.
     """
     low, high = 0.0, math.inf  # scale with too little phase, and scale with too much phase or without an image
     for _ in range(60):
@@ -415,10 +443,11 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
 def location(study: Study, requirement: float) -> Verdict:
     """Verify the location limit with one image that contains all declared errors.
 
-    The errors are scaled by a common factor, so that the displacement by the gating model equals `requirement`. The
-    limit is confirmed if the displacement of the image agrees with the gating model to 5 % of the requirement.
-    For the published model (25), the effect of each single error must also agree with exact ranges. A displacement
-    that is only shorter than expected is conservative; a displacement in a different direction is not.
+    The errors are scaled by a common factor, so that their displacement by the gating model equals `requirement`. [m]
+    The limit is confirmed if the displacement in the image agrees with the gating model to 5 % of the requirement.
+    For the published model (25), the displacement by each single error must also agree with exact ranges. A limit of
+    this model is conservative if the displacements that disagree are only shorter than expected. Any other limit that
+    is not confirmed is optimistic.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -474,7 +503,11 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Find the scale at which the gating model displaces the image by the requirement; None if it never moves."""
+    """Find the factor for all errors at which their displacement by the gating model equals the requirement.
+
+    The result is None if the errors together do not displace the image, or if (25) has no solution in the published
+    model.
+    """
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)
         length = math.hypot(*displacement) if displacement else 0.0
@@ -494,7 +527,7 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
 
 
 def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundVector:
-    """Components along x′ and y′ of the difference between two displacements, as magnitudes. [m]"""
+    """Distances along x′ and along y′ between the displacements `a` and `b` (east, north). [m]"""
     look = study.geometry.look_azimuth
     cosine, sine = math.cos(look), math.sin(look)
     east, north = b[0] - a[0], b[1] - a[1]
@@ -502,10 +535,11 @@ def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundV
 
 
 def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
-    """Whether a displacement is short enough that no sum of such errors can be longer than expected.
+    """Whether a displacement is so short that sums of such displacements cannot exceed sums of the expected ones.
 
     The longest sum of several displacements over all combinations of signs is at least 2/π of the sum of their
-    lengths. So a missing length along the expected direction compensates for components across it in this ratio.
+    lengths. Therefore a missing length along the expected direction compensates for a component across it in this
+    ratio. The result is False if the expected displacement is zero.
     """
     length = math.hypot(*expected)
     if not length:

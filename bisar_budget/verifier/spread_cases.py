@@ -1,12 +1,14 @@
-"""Verdicts on the limits of errors that make echoes or spread power: vibration, sensors and clocks.
+"""Verdicts on the limits of vibration and of random errors of sensors, clocks and the atmosphere.
 
-The sigma of an effect describes many flights. It is measured from drawn time series, whose effects follow from exact
-ranges. For a few of the series, images show whether a response has the phase that exact ranges give.
+The standard deviation (sigma) of an effect describes many flights. It is measured from random time series of the
+error, whose effects follow from exact ranges. For a few of the series, images show whether a response has the phase
+that exact ranges give.
 
-Spread power is measured in as many drawn images as the verdict needs. Each is a cut across range: the Fourier
-transform of the phasor over the aperture under its window. The mainlobe lies within the first nulls of the error-free
-response, and the sidelobes are the remainder of one repeat interval. By Parseval's theorem, only the mainlobe has to
-be transformed. Energies are means over the draws.
+The power that errors spread (ISLR) is measured in as many random images as the verdict needs. Each image is a cut
+across range: the Fourier transform of the phasor over the aperture under its window. Because the aperture is sampled,
+the image repeats. The mainlobe lies within the first nulls of the error-free response, and the sidelobes fill the
+remainder of one repeat interval. By Parseval's theorem, only the mainlobe has to be transformed. Energies are means
+over the draws.
 """
 
 import math
@@ -104,13 +106,16 @@ Case = Callable[[], Verdict]
 
 # ---------------------------------------------------------------------- vibration
 def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield the subject of each vibration limit, and the function that verifies the limit.
+    """Yield the row subject of each limit on echoes and noise of vibration, and a function that verifies the limit.
 
-    The limits are those of one platform alone and of both together. With the published limits at equal shares, the
-    echoes of a sinusoid of one platform are 9 dB below the requirement. If both platforms vibrate in phase, the
-    echoes are 3 dB below the requirement. Independent noise-like vibration of both platforms exceeds the requirement
-    by 0.44 dB with a uniform window. With the limits of the full model, sinusoids of both platforms in phase meet the
-    requirement exactly, and so does noise-like vibration.
+    There are limits for each platform alone, and for both platforms together. Vibrations below one cycle per aperture
+    are verified in `phase_cases`.
+
+    With the published limits and equal shares of both platforms, the echoes of a sinusoidal vibration of one platform
+    are 9 dB below the requirement. If both platforms vibrate in phase, the echoes are 3 dB below the requirement.
+    Independent noise-like vibration of both platforms exceeds the requirement by 0.44 dB with a uniform window. With
+    the limits of the full model, sinusoidal vibration of both platforms in phase meets the requirement exactly. So
+    does noise-like vibration of both platforms.
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
@@ -163,10 +168,11 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Verdict on a sinusoidal vibration at its limit: its paired echo, compared with the requirement.
+    """Verdict on a sinusoidal vibration at its limit, whose paired echo is compared with the requirement.
 
-    The echo is measured in the difference from the error-free image, whose sidelobes would mask it. `limits` are the
-    amplitudes by platform [m], and `declared` is the declared frequency. [Hz]
+    The error-free image is subtracted before the echo is measured, because its sidelobes would mask the echo.
+    `limits` are the amplitudes at the limit, by platform. [m] `declared` is the declared frequency. [Hz] If it is
+    None, the vibration has 10 cycles per aperture.
     """
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
@@ -175,10 +181,10 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 
 
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
-    """Verdict on a group of tones of neighbouring frequencies, scaled together to their common limit.
+    """Verdict on a group of vibration tones of neighbouring frequencies, scaled together to their common limit.
 
-    The amplitudes keep their declared ratios, and the tones have their worst phases. `limit` is the amplitude of a
-    single tone with the same echo. [m]
+    The amplitudes keep their declared ratios. The tones have the starting phases with which they make the highest
+    echo. `name` is the platform. `limit` is the amplitude of a single tone with the same echo. [m]
     """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
@@ -202,9 +208,10 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Verdict on sinusoidal motions of platforms: their paired echoes, compared with the requirement in `blank`.
+    """Verdict on sinusoidal platform motions, whose paired echoes are compared with the requirement in `blank`.
 
-    `sinusoids` are the motions of each platform, by name. `who` describes them in the reason of the verdict.
+    `sinusoids` are the motions by platform. `who` describes them in the reason of the verdict. `is_assumed` tells
+    whether their frequency is assumed because the mission file does not state it.
     """
     collection = study.collection
     cycles_of_all = [
@@ -236,9 +243,10 @@ def echo(
 
 
 def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verdict:
-    """Verdict on a noise-like vibration at its limit: the ISLR that white vibration adds over the repeat interval.
+    """Verdict on a noise-like vibration at its limit, from the ISLR that white noise adds.
 
-    `limits` are the rms displacements by platform. [m] The ISLR is measured in as many draws as needed.
+    The ISLR is measured over one repeat interval of the image, in as many draws as the verdict needs. `limits` are
+    the rms displacements at the limit, by platform. [m]
     """
     collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
     slow_time = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
@@ -280,8 +288,8 @@ def measured_power(
 ) -> Verdict:
     """Verdict on the ISLR that random phases add, compared with the requirement in `blank`.
 
-    `draw` takes a number of draws and returns phases, (draws, _ISLR_SAMPLES). [rad] `basis` is the beginning of the
-    reason for the verdict.
+    `draw` takes a number of draws and returns random phases over the aperture, (draws, _ISLR_SAMPLES). [rad] `basis`
+    is the beginning of the reason for the verdict.
     """
     required = blank.requirement_db or 0.0
     added = added_islr(collection.window(_ISLR_SAMPLES), draw, required)
@@ -301,9 +309,9 @@ def measured_power(
 
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
-    """Size at which a random error reaches each requirement that limits it, without autofocus, by requirement.
+    """Sizes at which a random error reaches its limits without autofocus, by the name of the limiting requirement.
 
-    The result is empty if no requirement limits the error.
+    The sizes are in the unit of the error. The result is empty if no requirement limits the error.
     """
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
@@ -312,14 +320,14 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """Name of the gating model in which the error has the largest quadratic or cubic phase."""
+    """Name of the gating model in which a random error has the larger phase, quadratic or cubic."""
     return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
 def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield the subject of each oscillator tone that has a limit, and the function that verifies the limit.
+    """Yield the row subject of each oscillator tone that has a limit, and a function that verifies the limit.
 
-    In an image the tone is represented by a motion of its platform with the same phase.
+    In an image the tone is represented by a motion of its platform that causes the same phase.
     """
     mission, wavelength = study.mission, study.collection.wavelength
     metric, limits = tone_limits(mission, study.allocation)
@@ -347,18 +355,20 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
-    """Verdict on a tone at the limit that the ISLR requirement sets.
+    """Verdict on a tone at the limit that the requirement on ISLR sets.
 
-    The tone is a motion of the platform `owner` with an amplitude [m] and a number of `cycles` per aperture.
+    The tone is a motion of the platform `owner`. It has the amplitude `amplitude` [m] and the number `cycles` of
+    cycles per aperture.
     """
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verdict on the PSLR of the declared tones that together make the highest echo.
+    """Verdict on the PSLR requirement, from the declared tones that together make the highest echo.
 
-    The tones have their worst phases, and are scaled together so that their echo has the required PSLR.
+    The tones have the starting phases with which they make this echo. They are scaled together so that the echo has
+    the required PSLR.
     """
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
@@ -378,9 +388,9 @@ def verify_pslr(study: Study) -> Verdict:
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Verdict on the limit of a random error, which is the smallest of the sizes that its requirements allow.
+    """Verdict on the limit of a random error, which is the smallest of the sizes that the requirements allow.
 
-    The limit does not include autofocus.
+    The limit does not include the gain of autofocus.
     """
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
@@ -396,9 +406,10 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
-    """Verdict on the quadratic or cubic phase of a random error at its limit.
+    """Verdict on the quadratic or cubic phase that a random error causes at its limit.
 
-    The sigma of the phase, times the coverage factor, is compared with the budget.
+    The sigma of the phase, times the coverage factor, is compared with the budget. `binding` is the requirement that
+    sets the limit.
     """
     is_cubic = binding == CUBIC
     required = study.mission.requirements.cubic_phase_error
@@ -430,7 +441,7 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Verdict on the displacement of a random error at the limit that the location requirement sets.
+    """Verdict on the displacement that a random error causes at the limit set by the location requirement.
 
     The sigma of the displacement, times the coverage factor, is compared with the requirement.
     """
@@ -471,12 +482,15 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
-    """Random number generator for a row, seeded by the mission's seed and the id of the row."""
+    """Random number generator for a row, with a seed made from the mission's seed and the id of the row."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of a phase over many time series [rad], and the number of time series."""
+    """Standard deviation of the quadratic or cubic phase over many time series [rad], and the number of time series.
+
+    Time series for which no ground point has the range history are left out.
+    """
     if error.kind.drawn_as in _EFFECTS_OF_DRAWS:
         effects = _EFFECTS_OF_DRAWS[error.kind.drawn_as](study, error, rng)
         return float(np.nanstd(effects.cubic if is_cubic else effects.quadratic)), _SIGMA_DRAWS
@@ -485,7 +499,10 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 
 def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Compute the effects of many drawn motions of platforms from exact ranges, (draws,)."""
+    """Draw many motions of the platforms that a random error causes, and compute their effects from exact ranges.
+
+    The fields of the result are (draws,).
+    """
     if error.kind.is_correlated:  # not smooth between the nodes, unlike integrated noise
         return study.exact_effects(_smooth_noise(study, error, rng))
     moments = aperture_nodes(study.collection.aperture_time)
@@ -493,7 +510,10 @@ def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generato
 
 
 def _effects_of_delays(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Compute the effects of many drawn delays of the air from exact ranges, (draws,)."""
+    """Draw many delays in the atmosphere that a random error causes, and compute their effects from exact ranges.
+
+    The fields of the result are (draws,).
+    """
     moments = aperture_nodes(study.collection.aperture_time)
     group = group_delays(study.mission, error, moments, _delays_at_nodes(study, error, rng))
     mean = (group @ nodes(FINE_NODE_COUNT).fit[0])[:, None]
@@ -508,9 +528,9 @@ _EFFECTS_OF_DRAWS: Mapping[str, Callable[[Study, RandomError, np.random.Generato
 
 
 def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
-    """Range error due to delays of the air that remains at the displaced image point, (draws, times). [m]
+    """Range error over the aperture that delays in the atmosphere leave at the displaced image point. [m]
 
-    `group` are the group delays, (draws, times). [m] `times` are slow times. [s]
+    The result is (draws, times). `group` are the group delays, (draws, times). [m] `times` are slow times. [s]
     """
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
@@ -527,7 +547,11 @@ def _remaining_range_error(study: Study, error: RandomError, times: Floats, grou
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
-    """Legendre coefficients of drawn time series of a clock's phase, (4, draws) [rad], and the number of draws."""
+    """Draw time series of the phase of an oscillator or of the synchronisation link, and fit polynomials to them.
+
+    Returns the Legendre coefficients over the aperture up to the cubic order, (4, draws) [rad], and the number of
+    draws.
+    """
     mission, T = study.mission, study.collection.aperture_time
     draws, highest, count = _CLOCK_DRAWS, _MAX_TONE_CYCLES / T, 257
     if mission.synchronization is not None and mission.synchronization.interval is not None:
@@ -546,7 +570,10 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
 
 
 def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Drawn zenith delays at the nodes of exact ranges, in units of the declared sigma, (draws, nodes)."""
+    """Draw zenith delays, in units of the declared sigma, at the nodes of exact ranges, (draws, nodes).
+
+    For delays that are correlated over time, the result is their smooth part, see `_smooth_at_nodes`.
+    """
     T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
     if correlation_time is None:
         return zenith_delays(study.mission, error, aperture_nodes(T), _SIGMA_DRAWS, rng)
@@ -560,9 +587,9 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Smooth part of drawn correlated position noise at the nodes of exact ranges, by platform. [m]
+    """Draw correlated position noise, and return its smooth part at the nodes of exact ranges, by platform. [m]
 
-    Each array is (draws, nodes, 3). The smooth part is that of `_smooth_at_nodes`.
+    Each array is (draws, nodes, 3). `_smooth_at_nodes` defines the smooth part.
     """
     T, correlation_time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
     times = _moments(study, _SERIES_SAMPLES)
@@ -581,8 +608,8 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
     """Matrix that converts values at slow times to their smooth part at the nodes of exact ranges, (nodes, times).
 
-    The smooth part is a least-squares fit of Legendre polynomials up to `SMOOTH_ORDER`. If noise with a short
-    correlation time were sampled at the nodes alone, its phase would appear too large.
+    The smooth part is a least-squares fit of Legendre polynomials up to the order `SMOOTH_ORDER`. Without this fit,
+    the phase of noise with a short correlation time would appear too large, because the nodes are far apart.
     """
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
@@ -590,10 +617,10 @@ def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
-    """Ratio of the power of correlated noise at low frequencies to the power of its samples.
+    """Ratio of the power of correlated noise at low frequencies to the power of its samples at low frequencies.
 
-    Samples at steps of Δ have more power than the noise: Δ·coth(Δ/2τ_c) instead of 2τ_c, where τ_c is the correlation
-    time.
+    Samples at time steps Δ have more power than the noise itself: Δ·coth(Δ/2τ_c) instead of 2τ_c. Here τ_c is the
+    correlation time. [s]
     """
     step = float(times[1] - times[0])
     return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
@@ -606,9 +633,9 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """Draw a few time series of an error, and convert them to errors that the simulator applies to images.
+    """Draw a few time series of a random error, as errors that the simulator applies to images.
 
-    Only orders up to the cubic are kept, because higher orders spread power and would mask the response.
+    Only Legendre orders up to the cubic are kept, because higher orders spread power and would mask the response.
     """
     return _IMAGE_ERRORS[error.kind.drawn_as](study, error, _moments(study, _SERIES_SAMPLES), rng)
 
@@ -649,9 +676,10 @@ _IMAGE_ERRORS: Mapping[str, Callable[[Study, RandomError, Floats, np.random.Gene
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, row_subject: Subject) -> Verdict:
-    """Verdict on the ISLR of all declared errors that spread power, scaled together to the limit of an owner.
+    """Verdict on the ISLR limit of an owner, from all declared errors of the owner that spread power.
 
-    The owner is that of the row, `row_subject`.
+    The errors are scaled together until their power equals the limit. `row_subject` is the subject of the row, which
+    names the owner.
     """
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
@@ -685,11 +713,12 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on the ISLR that errors at a limit add to an image, compared with the ISLR that an owner may add.
+    """Verdict on errors at a limit, whose added ISLR in an image is compared with the ISLR that `owner` may add.
 
-    `members` are random errors, of which time series are drawn. Their Legendre orders up to `order` are removed. The
-    other phases have random starts: `white` is the rms of white noise, `echoes` are pairs of the rms and the cycles
-    per aperture of tones, and `cubic` is the rms of a cubic phase over the aperture. [rad]
+    `members` are random errors, of which time series are drawn. `white` is the rms phase of additional white noise.
+    [rad] Legendre orders up to `order` are removed from the time series and from the noise. `echoes` are tones, each
+    given by its rms phase [rad] and its number of cycles per aperture; their starting phases are random. `cubic` is
+    the rms of a random cubic phase over the aperture. [rad]
     """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
@@ -700,7 +729,10 @@ def _power(
     fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
 
     def draw_phases(draws: int) -> Floats:
-        """Draw phases without the orders that displace and defocus the response, (draws, _ISLR_SAMPLES). [rad]"""
+        """Draw the phases of all errors over the aperture, (draws, _ISLR_SAMPLES). [rad]
+
+        Random errors and white noise are drawn without the orders that displace or defocus the response.
+        """
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
             for phases_of_error in _PHASES_AT_MOMENTS[error.kind.drawn_as](study, error, times, draws, rng):
@@ -723,7 +755,10 @@ def _power(
 def _phases_of_motion(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Draw the motion of each platform, and yield its phase along the line of sight, (draws, times). [rad]"""
+    """Draw the motion of each platform, and yield the phase that its component along the line of sight causes. [rad]
+
+    Each array is (draws, times).
+    """
     for name, courses in position_courses(study.mission, error, times, draws, rng).items():
         yield 2 * math.pi / study.collection.wavelength * courses @ np.array(sight_of(study.mission, name))
 
@@ -731,7 +766,10 @@ def _phases_of_motion(
 def _phases_of_delays(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Draw delays of the air, and yield their phase at the displaced point, (draws, times). [rad]"""
+    """Draw delays in the atmosphere, and yield the phase that they leave at the displaced image point. [rad]
+
+    The only array is (draws, times).
+    """
     group = delay_courses(study.mission, error, times, draws, rng)
     yield 2 * math.pi / study.collection.wavelength * _remaining_range_error(study, error, times, group)
 
@@ -739,7 +777,7 @@ def _phases_of_delays(
 def _phases_of_clock(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Draw the phase of an oscillator or of the link, (draws, times). [rad]"""
+    """Yield random phases of an oscillator or of the synchronisation link in a single array, (draws, times). [rad]"""
     yield phase_courses(study.mission, error, times, draws, rng)
 
 
@@ -752,7 +790,10 @@ _PHASES_AT_MOMENTS: Mapping[
 # ---------------------------------------------------------------------- ISLR that noise adds
 @dataclass(frozen=True, slots=True)
 class AddedIslr:
-    """ISLR that noise adds, with the ends of its 95 % confidence interval [dB], and the number of draws."""
+    """ISLR that noise adds, the ends of its 95 % confidence interval [dB], and the number of draws.
+
+    `level` is the ISLR, and `low` and `high` are the ends of the interval.
+    """
 
     level: float
     low: float
@@ -761,14 +802,15 @@ class AddedIslr:
 
     @property
     def error(self) -> float:
-        """Standard error of the ISLR. [dB]"""
+        """Standard error of the measured ISLR. [dB]"""
         return (self.high - self.low) / (2 * _INTERVAL_95_SIGMA)
 
     def verdict(self, required_db: float) -> str:
-        """Verdict on a limit, given the required ISLR; `not_evaluated` if more draws may change the verdict.
+        """Verdict on a limit at which the noise adds this ISLR, compared with the required ISLR.
 
-        If the maximum number of draws does not decide between confirmed and conservative, the verdict is
-        `conservative`, because such a limit does not add too much.
+        The verdict is `not_evaluated` if more draws may change it. If even the maximum number of draws does not
+        decide between `confirmed` and `conservative`, the verdict is `conservative`, because the noise does not add
+        too much ISLR in either case.
         """
         excess, doubt = self.level - required_db, _DECISION_SIGMA * self.error
         low, high = excess - doubt, excess + doubt
@@ -782,7 +824,7 @@ class AddedIslr:
 
 
 class Mainlobe:
-    """Mainlobe of an error-free response, between its first nulls.
+    """Mainlobe of an error-free response, which lies between the first nulls of the response.
 
     Parameters
     ----------
@@ -802,9 +844,9 @@ class Mainlobe:
         self.energy = float(self._clean**2 @ self._steps)
 
     def lost(self, phases: Floats) -> Floats:
-        """Energy that phases remove from the mainlobe, as a fraction of the energy of the image, (draws,).
+        """Energy that phase errors remove from the mainlobe, as a fraction of the energy of the image, (draws,).
 
-        `phases` are (draws, moments). [rad]
+        `phases` are the phase errors at the centres of the cells of the window, (draws, moments). [rad]
         """
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
@@ -812,7 +854,7 @@ class Mainlobe:
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """Added ISLR for a mean energy that the mainlobe loses, as a fraction of the energy of the image. [dB]"""
+        """ISLR that errors add if the mainlobe loses `lost`, a fraction of the energy of the image. [dB]"""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
@@ -820,7 +862,8 @@ class Mainlobe:
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
     """Measure the ISLR that random phases add, with as many draws as the verdict needs.
 
-    Drawing ends when the confidence interval permits only one verdict, or at the maximum number of draws.
+    No more phases are drawn when the confidence interval is narrow and permits a single verdict, or when the maximum
+    number of draws is reached.
 
     Parameters
     ----------

@@ -54,10 +54,10 @@ _MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest Doppler rate; lower rates ar
 
 
 class Spread(NamedTuple):
-    """Extent of a response in resolution cells: smear along its line, and walk in range.
+    """Extent of a smeared response: smear along the line of equal range, and range walk across it. [resolution cells]
 
-    If Doppler turns back within the aperture (`is_round`), the response spreads in all directions, and both numbers
-    are equal. A range cell has `finer` times as many pixels as a cross-range cell.
+    `is_round` marks an aperture within which Doppler reverses. The response then spreads in all directions, and
+    `smear` and `walk` are equal. A range cell has `finer` times as many pixels as a cross-range cell.
     """
 
     smear: int
@@ -67,10 +67,11 @@ class Spread(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Images of a point with errors and of an error-free point, both around the displaced position of the first.
+    """Image of a point with errors and image of an error-free point, around the same ground point.
 
-    `chip` is the image with errors, and `reference` the error-free image. `effect` is the effect of the errors from
-    exact ranges.
+    `chip` is the image with errors, in which the scene centre is displaced. `reference` is the error-free image of a
+    point at this displaced position. Both are images around the displaced position. `effect` is the effect of the
+    errors from exact ranges, and `spread` is the extent of the response.
     """
 
     errors: Errors
@@ -95,20 +96,23 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Create a verdict on a limit of the gating model, without the results of measurements.
+        """Create a verdict on a limit of the gating model that contains no measurements yet.
 
-        `fields` are further fields of the verdict.
+        `limit` is in `unit`. `fields` are additional fields of the verdict.
         """
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
     def is_full(self) -> bool:
-        """Whether displacement and cubic phase follow from exact ranges instead of Table I and (25)."""
+        """Whether displacement and cubic phase by the gating model follow from exact ranges.
+
+        Otherwise they follow from Table I and (25) of Rigling & Moses.
+        """
         return self.model != "published"
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Gating models, by which verdicts are decided: one model, or both models under `strictest`."""
+        """Gating models of the mission, whose limits are verified: one model, or both models under `strictest`."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
@@ -120,12 +124,12 @@ class Study:
         return [s for s in self.analysis.stated if s.declared and s.displaces]
 
     def members(self, owner: str) -> list[ErrorSource]:
-        """Declared errors that count against an owner's budget."""
+        """Declared errors that count against an owner's budget for the quadratic phase."""
         return [s for s in self.declared if self.allocation.qpe.includes(s.owner, owner)]
 
     @cached_property
     def unfocused_models(self) -> tuple[Model, ...]:
-        """The gating models for the same mission without autofocus, so that no phase includes autofocus gain."""
+        """Gating models of the mission with autofocus switched off, so that no phase includes autofocus gain."""
         if self.allocation.autofocus_gain == 1:
             return self.models
         unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))
@@ -133,19 +137,19 @@ class Study:
         return tuple(getattr(analysis, name) for name in analysis.gates)
 
     def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
-        """Smallest size at which an error reaches a limit on quadratic phase in a gating model.
+        """Smallest size at which an error reaches a limit on the quadratic phase in any of the gating models.
 
-        The size is in the unit of the error; None if the error never reaches the limit. `limit` is the quadratic
-        phase. [rad] `is_focused` tells whether it includes the gain of autofocus.
+        The size is in the unit of the error. It is None if the error never reaches the limit. `limit` is the largest
+        permitted quadratic phase. [rad] `is_focused` tells whether this limit includes the autofocus gain.
         """
         models = self.models if is_focused else self.unfocused_models
         sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
         return min((size for size in sizes if size is not None), default=None)
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
-        """Allowable size of an error under all requirements, autofocus included, and the requirement that sets it.
+        """Allowable size of an error under all requirements, and the name of the requirement that sets it.
 
-        Both are None if no requirement limits the error.
+        The size includes the autofocus gain. Both are None if no requirement limits the error.
         """
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
@@ -154,23 +158,24 @@ class Study:
         return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """Convert a single error of a given size to the errors that the simulator applies to an image."""
+        """Convert one error with a size in its own unit to the errors that the simulator applies to an image."""
         return flown(source, size, self.geometry, self.collection.aperture_time)
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
-        """Superpose several errors, each with `scale` times its size, as errors that the simulator applies."""
+        """Combine several errors, each with `scale` times its size, into errors that the simulator applies."""
         scaled = ((source, scale * size) for source, size in sizes)
         return flown_together(scaled, self.geometry, self.collection.aperture_time)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
-        """Compute the effect of several errors together from exact ranges."""
+        """Compute from exact ranges the effect of several errors together, each with `scale` times its size."""
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
-        """Compute the effects of many error histories from exact ranges.
+        """Compute from exact ranges the effects of many errors that vary in any way over the aperture.
 
         `courses` maps the name of a platform to its motion errors, (draws, nodes, 3) [m], and "clock" to range
-        errors, (draws, nodes) [m]. The nodes are `aperture_nodes`.
+        errors, (draws, nodes) [m]. `aperture_nodes` gives the slow times of the nodes. The fields of the result are
+        (draws,). They are NaN for a draw if no ground point has its range history.
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
@@ -200,8 +205,8 @@ class Study:
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
         """Scale declared errors until the sum of their quadratic phases in the gating model equals a budget [rad].
 
-        Returns pairs of an error and its scaled size. The signs of the sizes are such that the phases add. The list
-        is empty if no error has a phase.
+        Returns pairs of an error and its scaled size. The signs of the sizes are chosen so that the phases add. The
+        list is empty if no error has a quadratic phase.
         """
         model = self.models[-1]
 
@@ -227,7 +232,7 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Equal-loss quadratic phase of an error in a model, with the worse sign of the error. [rad]
+        """Equal-loss quadratic phase that an error with the worse of its two signs has in a model. [rad]
 
         The result has the sign of the quadratic phase of a small error. It is infinite if the phase is not finite.
         """
@@ -237,8 +242,8 @@ class Study:
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
         """Form the images for the errors of a row at its quadratic-phase limit, with the worse sign of the errors.
 
-        For the row of a single error, `limit` is the size of the error; for a sum, it is the budget. [rad] `room` is
-        described in `images`.
+        If the row is that of a single error, `limit` is the size of the error. If the row is that of a sum of errors,
+        `limit` is the budget for their phase. [rad] `room` is described in `images`.
         """
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
@@ -247,7 +252,7 @@ class Study:
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
         """Form the images of a point with errors and of an error-free point, on patches large enough for the smear.
 
-        `room` is the smallest permitted ratio of the width of a patch to the smear, because autofocus fails in a
+        `room` is the smallest ratio of the width of a patch to the smear. It exists because autofocus fails in a
         narrower patch. `range_cells` is the height of a patch without range walk, in range cells.
 
         Raises
@@ -263,7 +268,7 @@ class Study:
         return Responses(errors, effect, spread, *chips)
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
-        """Measure the quadratic and cubic phase over the aperture of a response in an image. [rad]
+        """Measure the quadratic and cubic phase over the aperture in an image with errors. [rad]
 
         `is_focused` tells whether autofocus has been applied to the image.
         """
@@ -280,15 +285,18 @@ class Study:
         )
 
     def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
-        """Equal-loss quadratic phase of an image: the purely quadratic phase with the same peak loss. [rad]
+        """Measure the equal-loss quadratic phase of an image. [rad]
 
-        The part of the loss due to the cubic phase and higher orders is subtracted first.
+        It is the purely quadratic phase that would cause the same loss of the peak as the errors in the image. The
+        part of the loss that the cubic phase and higher orders cause is not included.
 
-        If the hidden phase is small, the result follows from the phase over the aperture, otherwise from the loss of
-        the peak. The loss is compared with the loss of a direct sum from exact ranges under the same window, because
-        a loss equals the variance of the phase only to second order and depends on the window. With a loss of more
-        than about 3 dB, an image has no single peak. In that case the result is the root-sum-square of the measured
-        quadratic phase and the hidden phase from exact ranges.
+        If the hidden phase is small, the result is the root-sum-square of two phases: the quadratic phase measured
+        over the aperture, and the hidden phase from exact ranges. The same applies if the loss is more than about
+        3 dB, because the image then has no single peak.
+
+        Otherwise the result follows from the measured loss of the peak. This loss is compared with that of a
+        direct sum from exact ranges under the same window. The comparison is necessary because a loss equals the
+        variance of the phase only to second order, and depends on the window.
         """
         effect = images.effect
         variance, other_variance = _phase_variances(effect)
@@ -300,20 +308,21 @@ class Study:
         return QUADRATIC_OF_VARIANCE * math.sqrt(max(measured, 0.0))
 
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
-        """Displacement of a response from its position by exact ranges, and the line of its smear.
+        """Measure the displacement of a response from its position by exact ranges, and the line of its smear.
 
-        Up to a loss of about 3 dB, the position of the response is that of the peak of the image. The same applies
-        whenever Doppler turns back, because then no slope of the phase over the aperture locates a response along a
-        line.
+        Up to a peak loss of about 3 dB, the position of the response is the peak of the image. With a larger loss,
+        the position follows from `reading`. If Doppler reverses within the aperture, the position is always the peak,
+        because the slope of the phase over the aperture then does not locate a response along a line.
         """
         variance, other_variance = _phase_variances(images.effect)
         has_line = variance + other_variance > _SINGLE_PEAK_RAD2 and not images.spread.is_round
         return measured_shift(images.chip, images.reference, reading if has_line else None)
 
     def _expected_loss(self, images: Responses) -> float:
-        """Expected loss of an image: minus the natural logarithm of its relative peak power under the window.
+        """Expected peak loss of an image with errors: minus the natural logarithm of its relative peak power.
 
-        The peak power follows from a direct sum over pulses and frequencies with exact ranges.
+        The peak power is relative to that of an error-free image. It follows from a direct sum over pulses and
+        frequencies under the window, with exact ranges.
         """
         collection = self.collection
         times = cell_centres(collection.aperture_time, _DIRECT_SUM_SAMPLES)
@@ -326,10 +335,10 @@ class Study:
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
-        """Refocus a response with the autofocus algorithm of the mission.
+        """Refocus the image with errors with the autofocus algorithm of the mission.
 
-        The quadratic phase differs from image line to image line. Only the lines whose phase is nearly that of the
-        middle line are used for the estimate.
+        The quadratic phase changes from image line to image line. Therefore the phase is estimated only from the
+        middle lines that `shared_lines` counts.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         lines = images.chip.image.shape[0]
@@ -338,9 +347,9 @@ class Study:
         return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
     def shared_lines(self, spread: Spread) -> int:
-        """Number of image lines on either side of the middle line that are used to estimate its quadratic phase.
+        """Number of lines on either side of an image's middle line from which autofocus estimates the phase.
 
-        They have nearly the quadratic phase of the middle line, or contain part of the response.
+        These lines have nearly the same quadratic phase as the middle line, or contain part of the response.
         """
         exact = self.analysis.exact
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
@@ -351,11 +360,12 @@ class Study:
         return max(shared, round(spread.walk * OVERSAMPLING_FACTOR * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
-        """Spread of a response due to errors, from the range error that remains over the aperture.
+        """Estimate how far a response spreads, from the range error that remains over the aperture.
 
         Each part of the aperture places the response on the line of equal range, at the point whose Doppler matches
-        the remaining slope of the range error. Where Doppler changes slowly, in part of a long aperture or with
-        nearly parallel gradients, a small slope corresponds to a long distance.
+        the slope of the remaining range error. A small slope corresponds to a long distance if Doppler changes
+        slowly. This is the case in parts of a long aperture, or if the gradients of range and Doppler are nearly
+        parallel.
         """
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
@@ -387,5 +397,5 @@ class Study:
 
 
 def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
-    """Variance of the equal-loss quadratic phase, and variance of the cubic phase and all higher orders. [rad²]"""
+    """Variances over the aperture of the equal-loss quadratic phase, and of the cubic and higher phases. [rad²]"""
     return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2
