@@ -44,7 +44,8 @@ _FORMAT_ENTRIES = (
     Format("github", "formats.annotations", (), "annotations of a pull request"),
     Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
     Format(
-        "html", "answers.check_answer", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
+        "html", "answers.check_answer", (".html", ".htm"), "a compliance report for a review board",
+        is_illustrated=True,
     ),
     Format(
         "markdown", "answers.check_answer", (".md", ".markdown"), "the same with its drawings beside it",

@@ -249,16 +249,22 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
         before, after = ("none" if status is None else STATUS[status].text for status in statuses)
         yield _ChangeInWords("requirement", requirement.name, before, after)
     if gate is None:
-        yield from (_ChangeInWords("loosened", loosened.id, "", loosened.words) for loosened in mission.loosened)
+        yield from (
+            _ChangeInWords("loosened", loosened.id, "", _arrow(loosened.words)) for loosened in mission.loosened
+        )
 
 
 def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_ChangeInWords]:
     """Refusals of a gate, including the ones that `--allow` lets through."""
     labels = {False: "refused", True: "allowed"}
     return [
-        _ChangeInWords(labels[refusal.is_allowed], refusal.id, "", refusal.words)
+        _ChangeInWords(labels[refusal.is_allowed], refusal.id, "", _arrow(refusal.words))
         for refusal in _refusals(change, gate)
     ]
+
+
+def _arrow(words: str) -> str:
+    return words.replace(" -> ", " → ")
 
 
 def _groups(changes: Iterable[_ChangeInWords]) -> Iterator[doc.Block]:
