@@ -26,7 +26,15 @@ from bisar_budget.json_types import JsonDocument
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words, waived_count
+from bisar_budget.report.words.sentences import (
+    allowable_words,
+    matters,
+    own_id,
+    row_size,
+    shown_use,
+    use_words,
+    waived_count,
+)
 from bisar_budget.resources import special_file
 
 if TYPE_CHECKING:
@@ -242,7 +250,7 @@ class CheckResult(Mapping[str, Row]):
         findings = self.findings
         required = [
             (
-                line.name,
+                f"{line.name}{own_id(line.requirement)}",
                 line.allowed,
                 line.reached,
                 line.use,
@@ -271,7 +279,7 @@ class CheckResult(Mapping[str, Row]):
         )
 
 
-_NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of a table
+_NESTED = ("displacement_m", "notes", "requirement_ids")  # fields of a row that fit in no cell of a table
 _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 
 

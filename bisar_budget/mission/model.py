@@ -34,6 +34,7 @@ from bisar_budget.mission.readers import (
     Choice,
     Day,
     Glob,
+    IdMap,
     Key,
     ListOf,
     OneOf,
@@ -43,6 +44,7 @@ from bisar_budget.mission.readers import (
     Section,
     SectionValues,
     SizeMap,
+    Statement,
     Text,
     TextMap,
     Version,
@@ -512,7 +514,18 @@ class Mission(NamedTuple):
     ] = None
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
-    requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
+    requirement_ids: Annotated[
+        Mapping[str, tuple[str, ...]],
+        Key(
+            IdMap(),
+            "Requirement ids of the project, by the id of a row or of a requirement (requirement.location_error): a "
+            "text or a list.",
+        ),
+    ] = {}
+    requirement_texts: Annotated[
+        Mapping[str, str],
+        Key(TextMap("requirement id", Statement()), "Text of each requirement, by the id in requirement_ids."),
+    ] = {}
     specifications: Annotated[
         Mapping[str, "Number"],
         Key(

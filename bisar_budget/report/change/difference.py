@@ -84,7 +84,8 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
     for requirement in mission.requirements:
         statuses = (requirement.before, requirement.after)
         before, after = ("none" if status is None else STATUS[status].text for status in statuses)
-        yield _ChangeInWords("requirement", requirement.name, f"{before} -> {after}")
+        name = f"{requirement.name} [{', '.join(ids)}]" if (ids := requirement.requirement_ids) else requirement.name
+        yield _ChangeInWords("requirement", name, f"{before} -> {after}")
     if gate is None:
         yield from (_ChangeInWords("loosened", loosened.id, loosened.words) for loosened in mission.loosened)
 
@@ -278,7 +279,7 @@ def _refusal(refusal: Refusal) -> dict[str, object]:
 
 
 def _document(change: Change, is_refused: bool) -> dict[str, object]:
-    keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id")
+    keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id", "requirement_ids")
     return {
         "id": change.id,
         "erosion": change.erosion,

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES, id_of_requirement
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
@@ -23,7 +23,16 @@ from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
-from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
+from bisar_budget.report.words.sentences import (
+    counted,
+    need_text,
+    own_id,
+    percent,
+    rst_text,
+    share_percent,
+    table,
+    wrapped,
+)
 
 _LISTED_COUNT = 3  # parts of the catalogue that a table names
 _SHEET_COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
@@ -52,6 +61,7 @@ def _document(answer: Answer) -> dict[str, object]:
         "requirements": [
             {
                 "key": requirement.key,
+                "requirement_ids": list(requirement.requirement_ids),
                 "value": requirement.value,
                 "unit": requirement.unit,
                 "used": requirement.utilization,
@@ -284,7 +294,14 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
-            [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
+            [
+                f"{line.name}{own_id(line.requirement)}",
+                line.allowed,
+                line.reached,
+                line.use,
+                doc.Badge(line.status),
+                _decided_by(line),
+            ]
             for line in requirement_lines(sheet.findings)
         ]
         yield doc.TextTable("Requirements", "Requirements with the ordered sizes", heads, rows)
@@ -427,8 +444,9 @@ def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
         return []
     limits = [row for row in sheet.rows if row.shares.get(spec.key, 0.0) >= _PARENT_SHARE_FRACTION]
     rows = [row.id for row in limits] + [f"mission.{row.requirement}" for row in limits]
+    rows += [id_of_requirement(row.requirement) for row in limits if row.requirement]
     keys = parts_of(spec.key)
     owner_and_kind = (keys[1] if len(keys) > 1 else "", keys[-1])
     rows += [row.id for row in findings.rows if (row.owner, row.subject.kind) == owner_and_kind]
     ids = findings.mission.requirement_ids
-    return list(dict.fromkeys(ids[row] for row in rows if row in ids))
+    return list(dict.fromkeys(own_id for row in rows for own_id in ids.get(row, ())))
