@@ -21,10 +21,9 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
-from bisar_budget.findings.requirement import id_of_requirement
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm, plain_vector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, id_of_requirement
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note

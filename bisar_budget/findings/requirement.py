@@ -20,11 +20,6 @@ REQUIREMENT_NAMES = {
 }
 
 
-def id_of_requirement(key: str) -> str:
-    """Id of a requirement by its key, such as `requirement.islr`, in lists that also contain rows."""
-    return f"requirement.{key}"
-
-
 @dataclass(frozen=True, kw_only=True)
 class DecidingShare:
     """A share of a requirement whose limit decides the status, in place of the limit of the full requirement.

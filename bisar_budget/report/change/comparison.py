@@ -181,7 +181,7 @@ def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
     """Yield the requirements that were removed or now have a larger value."""
     for key in Requirements._fields:
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
-        if key != "declare" and old is not None and (new is None or _is_above(new, old)):
+        if key not in ("declare", "file") and old is not None and (new is None or _is_above(new, old)):
             path = ("requirements", key)
             yield Loosened(dotted(path), _value_text(before, path, old), _value_text(after, path, new))
 

@@ -9,10 +9,11 @@ from collections.abc import Iterator, Sequence
 from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
-from bisar_budget.findings.requirement import REQUIREMENT_NAMES, id_of_requirement
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars

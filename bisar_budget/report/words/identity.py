@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.requirement import id_of_requirement
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.report import Style
 
 _STANDARD_INPUT = "standard input"

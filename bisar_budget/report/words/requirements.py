@@ -7,9 +7,10 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
-from bisar_budget.findings.requirement import DecidingShare, DeclaredKinds, JudgedRequirement, id_of_requirement
+from bisar_budget.findings.requirement import DecidingShare, DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import Note
 from bisar_budget.report.words.sentences import (
     counted,
