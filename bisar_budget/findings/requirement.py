@@ -124,13 +124,15 @@ class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
 
     `declared` and `missing` together are all kinds. `without_source` are the declared kinds for which the file states
-    no source. `shifted` are the figures that a level shifts, relative to their source.
+    no source. `shifted` are the figures that a level shifts, relative to their source. `required` are the words of
+    `requirements.declare`.
     """
 
     declared: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     without_source: tuple[str, ...] = ()
     shifted: tuple[ShiftedFigure, ...] = ()
+    required: tuple[str, ...] = ()
 
     @property
     def in_all(self) -> int:

@@ -172,10 +172,12 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
         accepted = "accepted: a cell that begins and ends with one, with doubled marks inside"
         faults.at(unclosed[0], "", "begins with a quotation mark that the cell does not close", accepted)
     by_name = {name: cells[index] if index < len(cells) else behind for name, index in columns.items()}
-    line = RequirementEntry(*(by_name[name] for name in COLUMNS))
+    line = RequirementEntry(*(_without_apostrophe(by_name[name]) for name in COLUMNS))
+    if not any(cell.text for cell in line):
+        return None  # only columns that are not used have text
     key = line.key.text.removeprefix("requirements.").removeprefix("requirement.")
     key = key if key in _LIMITS else line.key.text
-    line = line._replace(key=line.key._replace(text=key), limit=_without_apostrophe(line.limit))
+    line = line._replace(key=line.key._replace(text=key))
     if confidence := by_name.get(_CONFIDENCE, behind).text:
         problem = "a confidence for each limit is not there yet"
         faults.at(
@@ -204,7 +206,7 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
 
 
 def _without_apostrophe(cell: Cell) -> Cell:
-    """Cell without the apostrophe that keeps a spreadsheet from reading `-30 dB` as a formula."""
+    """Cell without an apostrophe that keeps a spreadsheet from reading it as a formula, such as `'-30 dB`."""
     return cell._replace(text=cell.text[1:]) if re.match("'[-+=@]", cell.text) else cell
 
 
@@ -221,10 +223,9 @@ def _limit(line: RequirementEntry) -> object:
 
 
 def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
-    """Record a fault for each line that contradicts or repeats an earlier line."""
+    """Record a fault for each line that contradicts an earlier line."""
     limits: dict[str, RequirementEntry] = {}
     texts: dict[str, RequirementEntry] = {}
-    pairs: dict[tuple[str, str], int] = {}
     for line in lines:
         if line.limit.text:
             first = limits.setdefault(line.key.text, line)
@@ -234,10 +235,6 @@ def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
         if line.text.text and texts.setdefault(line.id.text, line).text.text != line.text.text:
             problem = f"{printable(line.id.text)} has another text in line {texts[line.id.text].text.line}"
             faults.at(line.text, "text", problem, "accepted: one text for each id")
-        pair = line.id.text, line.key.text
-        if line.id.text and pair in pairs:
-            faults.at(line.id, "id", f"has the key {line.key.text} in line {pairs[pair]} already")
-        pairs.setdefault(pair, line.id.line)
 
 
 # ---------------------------------------------------------------------- into the tree of a mission

@@ -42,6 +42,10 @@ _FORMAT_ENTRIES = (
     Format("github", "formats.annotations", (), "annotations of a pull request"),
     Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
     Format(
+        "requirements", "formats.requirement_list", (".requirements.csv",), "a requirements file with status",
+        is_piecewise=True,
+    ),
+    Format(
         "html", "compliance.html", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
     ),
     Format(

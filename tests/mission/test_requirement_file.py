@@ -207,7 +207,7 @@ class TestFaults:
                 "3:19: limit: location_error has another limit in line 2, 5 m",
             ),
             ("A,a,location_error,5 m\nA,b,pslr,-3 dB", "3:3: text: A has another text in line 2 (got b)"),
-            ("A,a,location_error,5 m\nA,,location_error,", "3:1: id: has the key location_error in line 2 already"),
+            ("A,a,location_error,5 m\nA,,location_error,", ""),
             ("A,The image, as is,location_error,5 m", "2:"),
             ("A,,location_error,5 m,x", "2:23: is a cell beyond the 4 columns of the first line (got x)"),
             ('A,"Never closed,location_error,5 m', "2:3: begins with a quotation mark"),
