@@ -11,7 +11,10 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.report import format_of
 from tests.conftest import mission_text
 
-COLUMNS = ["id", "text", "key", "limit", "status", "reached", "use", "decided_by", "file"]
+COLUMNS = [
+    *("id", "text", "key", "limit", "status", "reached", "use", "decided_by"),
+    *("file", "finding", "overrides"),
+]
 REQUIREMENTS = """id,text,key,limit,owner
 SYS-042,"The image, as a whole, shall be located within 1 mm.",location_error,1.0 mm,A
 SYS-043,,location_error,1 mm,B

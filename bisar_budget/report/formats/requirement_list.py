@@ -13,16 +13,21 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.formats.csv_table import csv_text
-from bisar_budget.report.words.requirements import requirement_lines
-from bisar_budget.report.words.sentences import row_size, shown_use, use_words
+from bisar_budget.report.words.heading import overrides_words
+from bisar_budget.report.words.requirements import requirement_finding, requirement_lines
+from bisar_budget.report.words.sentences import finding, row_size, shown_use, use_words
 
-_STATUS_COLUMNS = ("id", "text", "key", "limit", "status", "reached", "use", "decided_by", "file")
+_STATUS_COLUMNS = (
+    *("id", "text", "key", "limit"),
+    *("status", "reached", "use", "decided_by", "file", "finding", "overrides"),
+)
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
     """Write the lines of a mission, without the header. A file that cannot be used has a line with its status."""
     if isinstance(mission, UnusableMission):
-        return csv_text([["", "", "", "", mission.status, "", "", "", mission.file]])
+        faults = "; ".join(map(str, mission.faults))
+        return csv_text([["", "", "", "", mission.status, "", "", "", mission.file, faults, ""]])
     return csv_text([*_requirements(mission), *_rows(mission)])
 
 
@@ -34,7 +39,8 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
     for line in requirement_lines(mission):
         requirement = line.requirement
-        result = [requirement.status, line.reached, line.use, requirement.row or "", mission.file]
+        sizes = (requirement.status, line.reached, line.use, requirement.row or "")
+        result = [*sizes, mission.file, requirement_finding(requirement, mission), overrides_words(mission)]
         for own_id in requirement.requirement_ids or ("",):
             text = mission.requirement_texts.get(own_id, "")
             yield [own_id, text, requirement.key, limit_of_file(requirement, mission), *map(_or_empty, result)]
@@ -42,7 +48,8 @@ def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
 
 def _rows(mission: MissionFindings) -> Iterator[list[str]]:
     for row in mission.rows:
-        result = [row.status, row_size(row.declared, row, mission), use_words(shown_use(row)), row.id, mission.file]
+        sizes = (row.status, row_size(row.declared, row, mission), use_words(shown_use(row)), row.id)
+        result = [*sizes, mission.file, finding(row, mission), overrides_words(mission)]
         for own_id in row.requirement_ids:
             yield [own_id, mission.requirement_texts.get(own_id, ""), row.id, "", *map(_or_empty, result)]
 

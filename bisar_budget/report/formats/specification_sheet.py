@@ -19,6 +19,7 @@ from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
+from bisar_budget.report.formats.strictdoc import StrictNode, strict_document, strict_uid
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.heading import overrides_words, title_lines
@@ -349,25 +350,7 @@ def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
 # ---------------------------------------------------------------- for tools that trace requirements
 _PREFIX = "SPEC"
 _PARENT_SHARE_FRACTION = 1e-3  # smallest share of a requirement for which a specification derives from it
-_GRAMMAR = """[GRAMMAR]
-ELEMENTS:
-- TAG: REQUIREMENT
-  FIELDS:
-  - TITLE: UID
-    TYPE: String
-    REQUIRED: True
-  - TITLE: TITLE
-    TYPE: String
-    REQUIRED: True
-  - TITLE: STATEMENT
-    TYPE: String
-    REQUIRED: True
-  - TITLE: RATIONALE
-    TYPE: String
-    REQUIRED: False
-  RELATIONS:
-  - TYPE: Parent
-"""
+_SPECIFICATION_GRAMMAR = {"REQUIREMENT": {"UID": True, "TITLE": True, "STATEMENT": True, "RATIONALE": False}}
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
@@ -392,15 +375,19 @@ def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
     specifications = list(_specified(answers, style))
     names = [identity.of(spec.key) for _, identity, spec in specifications]
     uids = distinct([identifier(_PREFIX, name) for name in names], names)
-    lines = ["[DOCUMENT]", f"TITLE: specifications, by bisar-budget {__version__}", "", _GRAMMAR]
-    for uid, (sheet, _, spec) in zip(uids, specifications, strict=True):
-        lines += ["[REQUIREMENT]", f"UID: {uid}", f"TITLE: {printable(_title(sheet, spec))}"]
-        lines += [f"STATEMENT: {printable(_statement(spec))}", f"RATIONALE: {printable(_rationale(sheet, spec))}"]
-        parents = _parents(sheet, spec)
-        lines += ["RELATIONS:"] if parents else []
-        lines += [line for parent in parents for line in ("- TYPE: Parent", f"  VALUE: {printable(parent)}")]
-        lines.append("")
-    return "\n".join(lines)
+    nodes = [
+        StrictNode(
+            {
+                "UID": uid,
+                "TITLE": _title(sheet, spec),
+                "STATEMENT": _statement(spec),
+                "RATIONALE": _rationale(sheet, spec),
+            },
+            [strict_uid(parent) for parent in _parents(sheet, spec)],
+        )
+        for uid, (sheet, _, spec) in zip(uids, specifications, strict=True)
+    ]
+    return strict_document(f"specifications, by bisar-budget {__version__}", _SPECIFICATION_GRAMMAR, nodes)
 
 
 def _specified(

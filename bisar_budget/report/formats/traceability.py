@@ -246,7 +246,7 @@ def _unused(identifier: str, needs: Container[str]) -> str:
 def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, object]:
     texts = [*mission.texts_of(row), measure(row, mission), cause(row), f"From {row.equation}."]
     texts += [f"Evidence: {row.evidence}"] if row.evidence else []
-    texts += _origin(row.line, mission, file)
+    texts += origin(row.line, mission, file)
     return _need(f"{row.id} of {mission.name}", row.status, texts, row.metric, links=row.requirement_ids)
 
 
@@ -254,7 +254,7 @@ def _requirement_need(requirement: JudgedRequirement, mission: MissionFindings, 
     texts = [
         *mission.texts_of(requirement),
         requirement_finding(requirement, mission),
-        *_origin(requirement.line, mission, file),
+        *origin(requirement.line, mission, file),
     ]
     title, tags = f"{requirement.name} of {mission.name}", ("requirement", requirement.key)
     return _need(title, requirement.status, texts, *tags, links=requirement.requirement_ids)
@@ -276,7 +276,7 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, links: Sequ
     }
 
 
-def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
+def origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
     """Yield texts on where a value comes from: file and line, then changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
