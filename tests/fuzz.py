@@ -545,7 +545,8 @@ _POINTS = {
     "allan_deviation": (("0.1 s", "1 s", "10 s"), ("",), (1e-12, 1e-10)),
     "specifications": (("platforms.receiver.motion_error.velocity", "timing_error.linear"), ("", "m/s"), (0.1, 1)),
     "specify": (("platforms.receiver.motion_error.velocity", "timing_error.linear"), ("",), (1, 2)),
-    "requirement_ids": (("receiver.velocity.x", "mission.islr"), ("",), (1, 2)),
+    "requirement_ids": (("receiver.velocity.x", "mission.islr", "requirement.location_error"), ("",), (1, 2)),
+    "requirement_texts": (("1", "SYS-1"), ("",), (1, 2)),
     "correlation": (("position.x-velocity.x", "position.y-position.z"), ("",), (-1, 1)),
 }
 _PLACES = ("", "collection", "scene", "requirements", "allocation", "Platform", "MotionError", "Oscillator", "Imu")

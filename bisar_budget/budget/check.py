@@ -136,6 +136,7 @@ def _findings(
         changes=mission.changes,
         model_doubt=model_doubt(case, rows),
         confidence=confidence_of(case),
+        requirement_texts=case.mission.requirement_texts,
     )
 
 

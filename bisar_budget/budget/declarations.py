@@ -346,7 +346,8 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
                 without_source.append(kind)
         elif of_mission.is_owed(mission):
             missing.append(kind)
-    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source), tuple(shifted_figures(mission)))
+    shifted, required = tuple(shifted_figures(mission)), mission.requirements.declare
+    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source), shifted, required)
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:

@@ -15,6 +15,7 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
+from bisar_budget.budget.judged_requirements import required_keys
 from bisar_budget.constants import LEAST_FALLING_HEIGHT_M, MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
@@ -22,8 +23,9 @@ from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm, plain_vector
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, id_of_requirement
 from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.resolution import Resolution
 
@@ -81,14 +83,33 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
         yield _Warned(
             None, phrases.note("another-mission", changes=changes_words(mission.changes)), is_of_options=True
         )
-    row_ids = {row.id for row in rows} if mission.requirement_ids else set()
-    for row_id in mission.requirement_ids:
-        if row_id not in row_ids:
-            yield _Warned(("requirement_ids", row_id), phrases.note("id-of-no-row", row_id=row_id))
+    yield from _of_own_ids(mission, rows)
     if mission.earth_orientation is not None and all(platform.orbit is None for platform in mission.platforms):
         yield _Warned(("earth_orientation",), phrases.note("no-orbit-to-turn"))
     if mission.gating_model != mission.allocation.model:
         yield _Warned(("synchronization", "method"), phrases.note("full-model-gates", model=mission.allocation.model))
+
+
+def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
+    """Yield warnings of requirement ids for rows that do not exist, and of texts for ids that are never given."""
+    if mission.requirement_ids:
+        ids = [row.id for row in rows] + [id_of_requirement(key) for key in required_keys(mission)]
+        unique_ids = set(ids)
+        for row_id in mission.requirement_ids:
+            if row_id not in unique_ids:
+                note = phrases.note("id-of-no-row", row_id=row_id, nearest=_nearest(row_id, ids))
+                yield _Warned(("requirement_ids", row_id), note)
+    own_ids = tuple(own_id for ids in mission.requirement_ids.values() for own_id in ids)
+    for own_id in mission.requirement_texts:
+        if own_id not in own_ids:
+            note = phrases.note("text-of-no-id", own_id=own_id, nearest=_nearest(own_id, own_ids))
+            yield _Warned(("requirement_texts", own_id), note)
+
+
+def _nearest(name: str, ids: Sequence[str]) -> str:
+    """Sentence with the known id nearest to an unknown one, to append to a sentence; empty without a similar one."""
+    hint = did_you_mean(name, tuple(ids))
+    return hint and f". {hint}"
 
 
 def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:

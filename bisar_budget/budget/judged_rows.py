@@ -318,6 +318,6 @@ def worded(
         "reason": reason or None,
         "remarks": remarks,
         "equation": equation,
-        "requirement_id": mission.requirement_ids.get(row.subject.id),
+        "requirement_ids": mission.requirement_ids.get(row.subject.id, ()),
     }
     return Row(row.subject, row.metric, unit, **(fields | more_fields))

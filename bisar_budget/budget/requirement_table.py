@@ -36,6 +36,7 @@ from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
 from bisar_budget.error_kinds import kind_of
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import NOTHING, Note
 
 
@@ -79,7 +80,7 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
         line=mission.line(("requirements", "declare")),
         reason=_declarations_missing(missing) if missing else None,
         equation="requirements.declare",
-        requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
+        requirement_ids=mission.requirement_ids.get(DECLARATIONS.id, ()),
         model=mission.gating_model,
         is_unjudged=bool(missing),
         remarks=tuple(
@@ -208,6 +209,7 @@ def _entry(
         share=None if user is None or is_open else _share(user, key, case, use),
         autofocus_gain=case.allocation.autofocus_gain if key == QUADRATIC else None,
         use_row=None if user is None or use is None else user.id,
+        requirement_ids=mission.requirement_ids.get(id_of_requirement(key), ()),
     )
 
 

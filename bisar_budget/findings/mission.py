@@ -1,5 +1,6 @@
 """Findings about one mission file, and about all files of a run."""
 
+from collections.abc import Mapping
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,10 +77,17 @@ class MissionFindings(NamedTuple):
     overrides: tuple[Override, ...] = ()  # influences from outside the file on the verdict
     model_doubt: Note = NOTHING  # if the published model judges and does not hold
     confidence: Note = NOTHING  # with which requirements are met, if they are met
+    requirement_texts: Mapping[str, str] = {}  # texts of requirement ids, as the mission states them
 
     def __repr__(self) -> str:
         """File, name and status, on one line."""
         return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
+
+    def texts_of(self, judged: JudgedRequirement | Row) -> list[str]:
+        """Texts of the requirement ids of a row or requirement; ids without a text are left out."""
+        return [
+            self.requirement_texts[own_id] for own_id in judged.requirement_ids if own_id in self.requirement_texts
+        ]
 
     @property
     def mission(self) -> Mission | None:

@@ -47,7 +47,7 @@ class JudgedRequirement(NamedTuple):
     the row that decides the status, `use_row` is the row with the utilization, and `rows` are all rows that judge the
     requirement. `reason` tells why the requirement cannot be judged, or why it is not met. `waivers` are the waivers
     that cover the requirement or its rows; empty unless the requirement is waived. `is_unjudged` tells whether it
-    cannot be judged, even if it is waived.
+    cannot be judged, even if it is waived. `requirement_ids` are the ids that the project gives to the requirement.
     """
 
     key: str
@@ -67,6 +67,7 @@ class JudgedRequirement(NamedTuple):
     share: DecidingShare | None = None
     autofocus_gain: float | None = None
     use_row: str | None = None
+    requirement_ids: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Key, reached and allowed value, and status, on one line."""
@@ -82,6 +83,11 @@ class JudgedRequirement(NamedTuple):
     def id(self) -> str:
         """Id of the requirement in waivers and reports; the row for the whole mission, if any, has the same id."""
         return f"mission.{self.key}"
+
+    @property
+    def requirement_id(self) -> str | None:
+        """Ids of the project for the requirement, joined by commas; None if it has no such id."""
+        return ", ".join(self.requirement_ids) or None
 
     @property
     def name(self) -> str:
@@ -118,13 +124,15 @@ class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
 
     `declared` and `missing` together are all kinds. `without_source` are the declared kinds for which the file states
-    no source. `shifted` are the figures that a level shifts, relative to their source.
+    no source. `shifted` are the figures that a level shifts, relative to their source. `required` are the words of
+    `requirements.declare`.
     """
 
     declared: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     without_source: tuple[str, ...] = ()
     shifted: tuple[ShiftedFigure, ...] = ()
+    required: tuple[str, ...] = ()
 
     @property
     def in_all(self) -> int:

@@ -62,7 +62,7 @@ class Row(NamedTuple):
     together; the hidden phase is the part that the bandwidth and the turn of the line of sight do not resolve.
     `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the model that gives these numbers.
     `waivers` are the waivers, valid or expired, that name the row while it fails. `refuted` names the images that
-    refute the limit of the row.
+    refute the limit of the row. `requirement_ids` are the ids that the project gives to the row.
     """
 
     subject: Subject
@@ -82,7 +82,7 @@ class Row(NamedTuple):
     reason: Note | None = None
     remarks: tuple[Note, ...] = ()
     equation: str = ""
-    requirement_id: str | None = None
+    requirement_ids: tuple[str, ...] = ()
     evidence: str | None = None
     is_independent: bool = True
     qpe_exact_rad: float | None = None
@@ -106,6 +106,11 @@ class Row(NamedTuple):
     def id(self) -> str:
         """Name of the row in reports, waivers and the mission file's `requirement_ids`."""
         return self.subject.id
+
+    @property
+    def requirement_id(self) -> str | None:
+        """Ids of the project for the row, joined by commas; None if the file gives it no id."""
+        return ", ".join(self.requirement_ids) or None
 
     @property
     def owner(self) -> str:

@@ -243,7 +243,7 @@ class CheckResult(Mapping[str, Row]):
         return fragment(brief(self.findings))
 
 
-_NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of a table
+_NESTED = ("displacement_m", "notes", "requirement_ids")  # fields of a row that fit in no cell of a table
 
 
 # ---------------------------------------------------------------------- answers to other questions

@@ -29,7 +29,7 @@ from bisar_budget.mission.tree import MAX_BYTES, NULLS, Content, Tree
 _ACCEPTED_CHANGE = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY_CHARACTERS = 500  # ten times the longest path of the schema
 # Sections whose keys have dots: ids of rows, or whole paths.
-_WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "specify"))
+_WITH_DOTTED_KEYS = (("requirement_ids",), ("requirement_texts",), ("specifications",), ("allocation", "specify"))
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:

@@ -10,7 +10,15 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
-from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
+from bisar_budget.mission.model import (
+    MISSION,
+    Mission,
+    PartFile,
+    flies_on_earth,
+    names_files,
+    names_parts,
+    names_requirements,
+)
 from bisar_budget.mission.readers import INVALID, Invalid
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
@@ -132,8 +140,13 @@ def mission_of(
     mission: Mission | Invalid = INVALID
     parts: dict[str, PartFile] = {}
     with suppress(UnusableError):
-        mission = MISSION.read(tree.root, (), tree.report)
         folder = folder_of(file)
+        if names_requirements(tree.root):
+            from bisar_budget.mission.paths import reader_of
+            from bisar_budget.mission.requirement_file import add_requirements
+
+            add_requirements(tree, read_path or reader_of(folder), changes)
+        mission = MISSION.read(tree.root, (), tree.report)
         if mission is not INVALID and mission.allocation.specify:
             from bisar_budget.mission.changes import report_specified
 

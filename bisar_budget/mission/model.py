@@ -34,6 +34,7 @@ from bisar_budget.mission.readers import (
     Choice,
     Day,
     Glob,
+    IdMap,
     Key,
     ListOf,
     OneOf,
@@ -43,6 +44,7 @@ from bisar_budget.mission.readers import (
     Section,
     SectionValues,
     SizeMap,
+    Statement,
     Text,
     TextMap,
     Version,
@@ -258,6 +260,19 @@ class Requirements(NamedTuple):
             "common: common_motion_error; other: other_errors; terrain: scene.height_error.",
         ),
     ] = ()
+    file: Annotated[
+        str | None,
+        Key(
+            Reference(),
+            "CSV of requirements with the columns id, text, key and limit, in addition to the keys beside it and to "
+            "requirement_ids and requirement_texts.",
+        ),
+    ] = None
+
+
+def id_of_requirement(key: str) -> str:
+    """Id of a requirement by its key, such as `requirement.islr`, in lists that also contain rows."""
+    return f"requirement.{key}"
 
 
 def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
@@ -512,7 +527,18 @@ class Mission(NamedTuple):
     ] = None
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
-    requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
+    requirement_ids: Annotated[
+        Mapping[str, tuple[str, ...]],
+        Key(
+            IdMap(),
+            "Requirement ids of the project, by the id of a row or of a requirement (requirement.location_error): a "
+            "text or a list.",
+        ),
+    ] = {}
+    requirement_texts: Annotated[
+        Mapping[str, str],
+        Key(TextMap("requirement id", Statement()), "Text of each requirement, by the id in requirement_ids."),
+    ] = {}
     specifications: Annotated[
         Mapping[str, "Number"],
         Key(
@@ -697,11 +723,17 @@ def names_parts(mission: Mission) -> bool:
     )
 
 
+def names_requirements(root: Mapping[str, object]) -> bool:
+    """Whether the content of a mission file, valid or not, names a requirements file."""
+    requirements = root.get("requirements")
+    return isinstance(requirements, dict) and "file" in requirements
+
+
 def names_files(root: Mapping[str, object]) -> bool:
-    """Whether the content of a mission file, valid or not, names a part, an orbit or a log."""
+    """Whether the content of a mission file, valid or not, names a part, an orbit, a log or a requirements file."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
-    return any(
+    return names_requirements(root) or any(
         key in ("orbit", "trajectory") or (isinstance(item, dict) and "sensor" in item)
         for section in sections
         if isinstance(section, dict)

@@ -112,7 +112,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield the key and the name of each file that a mission names for a path or for the Earth's orientation."""
+    """Yield the key and the name of each file that a mission names, except for files of parts."""
     for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILE_KEYS:
@@ -120,6 +120,8 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
                     yield f"platforms.{name}.{key}.{form}", file
     if mission.earth_orientation is not None and mission.earth_orientation.file is not None:
         yield "earth_orientation.file", mission.earth_orientation.file
+    if mission.requirements.file is not None:
+        yield "requirements.file", mission.requirements.file
 
 
 def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:

@@ -51,6 +51,7 @@ _MAX_TEXT_CHARACTERS = 500
 _MAX_ENTRY_COUNT = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
 _MAX_NAME_COUNT = 8  # of a list of names; no platform needs more parts
+_MAX_OWN_ID_COUNT = 100  # requirement ids of one row or requirement
 _MAX_ID_COUNT = 4000  # of a mapping by row ids; even the longest lists give fewer rows
 _MAX_WILDCARD_COUNT = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
@@ -273,6 +274,8 @@ class Triple(Reader[tuple[float, ...]]):
 class Text(Reader[str]):
     """One line of printable text."""
 
+    name, max_characters = "Text", _MAX_TEXT_CHARACTERS
+
     def leaf(self, value: object) -> str:
         """Return the text; refuse a text that is empty, too long or not printable.
 
@@ -282,8 +285,8 @@ class Text(Reader[str]):
             raise InvalidValueError("must be text")
         if not value.strip():
             raise InvalidValueError("must not be empty")
-        if len(value) > _MAX_TEXT_CHARACTERS:
-            raise InvalidValueError(f"must be at most {_MAX_TEXT_CHARACTERS} characters, has {len(value)}")
+        if len(value) > self.max_characters:
+            raise InvalidValueError(f"must be at most {self.max_characters} characters, has {len(value)}")
         if _UNPRINTABLE.search(value):
             raise InvalidValueError("must be one line of printable text, without control characters")
         return value
@@ -296,9 +299,15 @@ class Text(Reader[str]):
         pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
         words = {"description": "One line of text."}
         definitions.setdefault(
-            "Text", {**words, "not": _NOT_SINGLE, "maxLength": _MAX_TEXT_CHARACTERS, "pattern": pattern}
+            self.name, {**words, "not": _NOT_SINGLE, "maxLength": self.max_characters, "pattern": pattern}
         )
-        return {"$ref": "#/definitions/Text"}
+        return {"$ref": f"#/definitions/{self.name}"}
+
+
+class Statement(Text):
+    """The text of a requirement: one line, longer than other texts."""
+
+    name, max_characters = "Statement", 4000
 
 
 class Reference(Text):
@@ -388,21 +397,21 @@ class Words(Reader[tuple[str, ...]]):
 
 
 class TextList(Words):
-    """A list of 1 to `_MAX_NAME_COUNT` names of parts, each at most once."""
+    """A list of 1 to `most` texts, each at most once; by default names of parts."""
 
     is_word = True
 
-    def __init__(self) -> None:
-        self.word = Reference()
-        self.problem = Problem(f"must be a list of 1 to {_MAX_NAME_COUNT} names")
-        self.fewest, self.most = 1, _MAX_NAME_COUNT
+    def __init__(self, text: Reader[str] | None = None, most: int = _MAX_NAME_COUNT, noun: str = "names") -> None:
+        self.word = text or Reference()
+        self.problem = Problem(f"must be a list of 1 to {most} {noun}")
+        self.fewest, self.most = 1, most
 
     def below(self, step: str) -> Reader[object] | None:
         """Reader of one name in the list; None if `step` is no index."""
         return self.word if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of at least one name as text."""
+        """JSON Schema: an array of at least one text."""
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
@@ -478,21 +487,50 @@ def _is_few(
 
 
 class TextMap(Reader[dict[str, str]]):
-    """A mapping of any key to text; `of` names the kind of the keys."""
+    """A mapping of any key to text; `of` names the kind of the keys, and `text` reads the texts."""
 
-    def __init__(self, of: str = "row id") -> None:
-        self.of = of
+    def __init__(self, of: str = "row id", text: Text | None = None) -> None:
+        self.of, self.text = of, text or Text()
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, str] | Invalid:
         """Read the text of each key; a problem with a text is reported at the path of its key."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
-        result = {key: read_part(Text(), text, (*path, key), report) for key, text in value.items()}
+        result = {key: read_part(self.text, text, (*path, key), report) for key, text in value.items()}
         return result if has_valid_values(result) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema: an object with any keys and with texts as values."""
-        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_ID_COUNT}
+        return {
+            "type": "object",
+            "additionalProperties": self.text.schema(definitions),
+            "maxProperties": _MAX_ID_COUNT,
+        }
+
+
+class IdMap(Reader[dict[str, tuple[str, ...]]]):
+    """A mapping of ids of rows and requirements to requirement ids of the project: a text, or a list of texts."""
+
+    def __init__(self) -> None:
+        self.text, self.texts = Text(), TextList(Text(), _MAX_OWN_ID_COUNT, "ids")
+
+    def read(self, value: object, path: KeyPath, report: Report) -> dict[str, tuple[str, ...]] | Invalid:
+        """Read the ids of each key as a tuple; a problem with an id is reported at its path."""
+        if not _is_few(value, dict, "must be a mapping of keys to ids", path, report):
+            return INVALID
+        result = {key: self._ids(ids, (*path, key), report) for key, ids in value.items()}
+        return result if has_valid_values(result) else INVALID
+
+    def _ids(self, value: object, path: KeyPath, report: Report) -> tuple[str, ...] | Invalid:
+        if isinstance(value, list):
+            return self.texts.read(value, path, report)
+        text = read_part(self.text, value, path, report)
+        return INVALID if text is INVALID else (text,)
+
+    def schema(self, definitions: Definitions) -> JsonObject:
+        """JSON Schema: an object with any keys, and with texts or arrays of texts as values."""
+        ids = {"anyOf": [self.text.schema(definitions), self.texts.schema(definitions)]}
+        return {"type": "object", "additionalProperties": ids, "maxProperties": _MAX_ID_COUNT}
 
 
 class SizeMap(Reader[dict[str, object]]):

@@ -7,7 +7,8 @@ from bisar_budget.units import format_quantity
 
 WARNING_SENTENCES: dict[str, str] = {
     "another-mission": "the mission checked is not that of the file: {changes}",
-    "id-of-no-row": "requirement_ids: no row has the id {row_id}",
+    "id-of-no-row": "requirement_ids: no row or requirement has the id {row_id}{nearest}",
+    "text-of-no-id": "requirement_texts: requirement_ids does not have the id {own_id}{nearest}",
     "no-orbit-to-turn": "earth_orientation: not used, since no platform has an orbit",
     "full-model-gates": (
         "allocation.model {model}: the published model ignores the direct path; the full model decides"

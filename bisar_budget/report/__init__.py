@@ -43,6 +43,11 @@ _FORMAT_ENTRIES = (
     Format("sarif", "formats.annotations", (".sarif", ".sarif.json"), "code scanning"),
     Format("github", "formats.annotations", (), "annotations of a pull request"),
     Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
+    Format("sdoc", "formats.strictdoc", (".sdoc",), "StrictDoc, and ReqIF through it"),
+    Format(
+        "requirements", "formats.requirement_list", (".requirements.csv",), "a requirements file with status",
+        is_piecewise=True,
+    ),
     Format(
         "html", "answers.check_answer", (".html", ".htm"), "a compliance report for a review board",
         is_illustrated=True,

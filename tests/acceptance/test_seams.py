@@ -16,13 +16,13 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 import yaml
-from bisar_budget.report.formats.verification import geometry_remarks
 
 import bisar_budget as bb
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.verdicts import with_verdicts
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.front.checks import day_of
+from bisar_budget.report.answers.verify_answer import geometry_remarks
 from bisar_budget.simulator.realisations import drawn_errors
 from bisar_budget.simulator.targets import parse_targets
 from tests.conftest import ROOT, findings, mission_text

@@ -45,7 +45,7 @@ def test_values_are_added_where_there_is_none() -> None:
     )
     assert mission.timing_error.linear == 1e-9
     assert mission.platforms.receiver.motion_error.velocity == (1e-3, 0.0, 2e-3)
-    assert mission.requirement_ids == {"receiver.velocity.x": "REQ-7"}
+    assert mission.requirement_ids == {"receiver.velocity.x": ("REQ-7",)}
     assert [other.name for other in mission.other_errors] == ["drift"]
 
 

@@ -73,6 +73,8 @@ def hold(text: str, name: str, file: Path | None = None) -> bool:
         load_mission(str(file)) if file is not None else parse_mission(text, name)
     except MissionError as error:
         visible = [fault for fault in error.faults if VISIBLE.search(fault.problem)]
+        # The unit of a specification is that of its key, which the schema does not look up.
+        visible = [fault for fault in visible if not fault.key.startswith("specifications.")]
         is_twice = any("is a duplicate key" in fault.problem for fault in error.faults)  # one hides the other
         # Names of axes are those of the frame beside them.
         if any(".correlation." not in fault.key for fault in visible) and not is_twice:

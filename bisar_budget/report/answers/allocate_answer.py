@@ -13,12 +13,14 @@ from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.json_document import outside_item
+from bisar_budget.report.formats.strictdoc import StrictNode, strict_document, strict_uid
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent
@@ -50,6 +52,7 @@ def _item(answer: Answer) -> dict[str, object]:
         "requirements": [
             {
                 "key": requirement.key,
+                "requirement_ids": list(requirement.requirement_ids),
                 "value": requirement.value,
                 "unit": requirement.unit,
                 "used": requirement.utilization,
@@ -279,25 +282,7 @@ def _table(sheet: SpecificationSheet) -> doc.TextTable:
 # ---------------------------------------------------------------- for tools that trace requirements
 _PREFIX = "SPEC"
 _PARENT_SHARE_FRACTION = 1e-3  # smallest share of a requirement for which a specification derives from it
-_GRAMMAR = """[GRAMMAR]
-ELEMENTS:
-- TAG: REQUIREMENT
-  FIELDS:
-  - TITLE: UID
-    TYPE: String
-    REQUIRED: True
-  - TITLE: TITLE
-    TYPE: String
-    REQUIRED: True
-  - TITLE: STATEMENT
-    TYPE: String
-    REQUIRED: True
-  - TITLE: RATIONALE
-    TYPE: String
-    REQUIRED: False
-  RELATIONS:
-  - TYPE: Parent
-"""
+_SPECIFICATION_GRAMMAR = {"REQUIREMENT": {"UID": True, "TITLE": True, "STATEMENT": True, "RATIONALE": False}}
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
@@ -322,15 +307,19 @@ def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
     specifications = list(_specified(answers, style))
     names = [identity.of(spec.key) for _, identity, spec in specifications]
     uids = distinct([identifier(_PREFIX, name) for name in names], names)
-    lines = ["[DOCUMENT]", f"TITLE: specifications, by bisar-budget {__version__}", "", _GRAMMAR]
-    for uid, (sheet, _, spec) in zip(uids, specifications, strict=True):
-        lines += ["[REQUIREMENT]", f"UID: {uid}", f"TITLE: {printable(_title(sheet, spec))}"]
-        lines += [f"STATEMENT: {printable(_statement(spec))}", f"RATIONALE: {printable(_rationale(sheet, spec))}"]
-        parents = _parents(sheet, spec)
-        lines += ["RELATIONS:"] if parents else []
-        lines += [line for parent in parents for line in ("- TYPE: Parent", f"  VALUE: {printable(parent)}")]
-        lines.append("")
-    return "\n".join(lines)
+    nodes = [
+        StrictNode(
+            {
+                "UID": uid,
+                "TITLE": _title(sheet, spec),
+                "STATEMENT": _statement(spec),
+                "RATIONALE": _rationale(sheet, spec),
+            },
+            [strict_uid(parent) for parent in _parents(sheet, spec)],
+        )
+        for uid, (sheet, _, spec) in zip(uids, specifications, strict=True)
+    ]
+    return strict_document(f"specifications, by bisar-budget {__version__}", _SPECIFICATION_GRAMMAR, nodes)
 
 
 def _specified(
@@ -375,8 +364,9 @@ def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
         return []
     limits = [row for row in sheet.rows if row.shares.get(spec.key, 0.0) >= _PARENT_SHARE_FRACTION]
     rows = [row.id for row in limits] + [f"mission.{row.requirement}" for row in limits]
+    rows += [id_of_requirement(row.requirement) for row in limits if row.requirement]
     keys = parts_of(spec.key)
     owner_and_kind = (keys[1] if len(keys) > 1 else "", keys[-1])
     rows += [row.id for row in findings.rows if (row.owner, row.subject.kind) == owner_and_kind]
     ids = findings.mission.requirement_ids
-    return list(dict.fromkeys(ids[row] for row in rows if row in ids))
+    return list(dict.fromkeys(own_id for row in rows for own_id in ids.get(row, ())))

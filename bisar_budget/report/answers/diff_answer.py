@@ -80,7 +80,7 @@ def _refusal(refusal: Refusal) -> dict[str, object]:
 
 
 def _document(change: Change, is_refused: bool) -> dict[str, object]:
-    keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id")
+    keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id", "requirement_ids")
     return {
         "id": change.id,
         "erosion": change.erosion,
@@ -247,7 +247,8 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
     for requirement in mission.requirements:
         statuses = (requirement.before, requirement.after)
         before, after = ("none" if status is None else STATUS[status].text for status in statuses)
-        yield _ChangeInWords("requirement", requirement.name, before, after)
+        ids = ", ".join(requirement.requirement_ids)
+        yield _ChangeInWords("requirement", f"{requirement.name} [{ids}]" if ids else requirement.name, before, after)
     if gate is None:
         yield from (
             _ChangeInWords("loosened", loosened.id, "", _arrow(loosened.words)) for loosened in mission.loosened

@@ -9,6 +9,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
+from bisar_budget.report.words.sentences import own_id
 
 
 def opening(
@@ -47,7 +48,14 @@ def requirement_table(findings: MissionFindings) -> doc.TextTable:
     """Make the table of requirements of a mission."""
     heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), "status", "decided by")
     rows: list[doc.Line] = [
-        [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
+        [
+            f"{line.name}{own_id(line.requirement)}",
+            line.allowed,
+            line.reached,
+            line.use,
+            doc.Badge(line.status),
+            _decided_by(line),
+        ]
         for line in requirement_lines(findings)
     ]
     return doc.TextTable("Requirements", "Requirements and their verdicts", heads, rows)

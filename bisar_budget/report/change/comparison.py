@@ -181,7 +181,7 @@ def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
     """Yield the requirements that were removed or now have a larger value."""
     for key in Requirements._fields:
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
-        if key != "declare" and old is not None and (new is None or _is_above(new, old)):
+        if key not in ("declare", "file") and old is not None and (new is None or _is_above(new, old)):
             path = ("requirements", key)
             yield Loosened(dotted(path), _value_text(before, path, old), _value_text(after, path, new))
 
@@ -454,13 +454,15 @@ class Change(NamedTuple):
 class RequirementMove(NamedTuple):
     """A requirement with its status before and after a change.
 
-    A status is None if that version of the mission has no such requirement.
+    A status is None if that version of the mission has no such requirement. `requirement_ids` are the ids that the
+    project gives to the requirement.
     """
 
     key: str
     name: str
     before: str | None
     after: str | None
+    requirement_ids: tuple[str, ...] = ()
 
     @property
     def id(self) -> str:
@@ -600,9 +602,9 @@ def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[R
     """Yield the requirements whose status changed."""
     old, new = ({each.key: each for each in findings.requirements} for findings in (before, after))
     for key, requirement in {**old, **new}.items():
-        statuses = [judged[key].status if key in judged else None for judged in (old, new)]
-        if statuses[0] != statuses[1]:
-            yield RequirementMove(key, requirement.name, *statuses)
+        earlier, later = (judged[key].status if key in judged else None for judged in (old, new))
+        if earlier != later:
+            yield RequirementMove(key, requirement.name, earlier, later, requirement.requirement_ids)
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:

@@ -38,6 +38,7 @@ from bisar_budget.report.words.heading import (
 )
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import (
+    RequirementLine,
     confidence_words,
     kind_names,
     requirement_id,
@@ -317,7 +318,7 @@ def _requirements(page: Page) -> doc.TextTable:
             decided = doc.Styled("id", doc.Name(line.decided_by))
         lines.append(
             (
-                sentence(line.name) + (" (default)" if line.requirement.is_default else ""),
+                _required(line),
                 dashed(line.allowed),
                 dashed(line.reached),
                 (dashed(line.use), doc.Use(None if line.use == "-" else line.requirement.utilization, line.status)),
@@ -328,6 +329,15 @@ def _requirements(page: Page) -> doc.TextTable:
     columns = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     caption = "Requirements and their verdicts"
     return doc.TextTable(f"Requirements of {page.name}", caption, columns, lines, "requirements")
+
+
+def _required(line: RequirementLine) -> doc.Text:
+    """Name of a requirement, with its requirement ids in the project and their texts."""
+    requirement = line.requirement
+    name = sentence(line.name) + (" (default)" if requirement.is_default else "")
+    ids = [requirement.requirement_id] if requirement.requirement_id else []
+    texts = [doc.Styled("own-id", doc.Name(text)) for text in (*ids, *line.texts)]
+    return (name, *texts) if texts else name
 
 
 def _drivers(page: Page) -> Iterator[Row]:

@@ -92,11 +92,16 @@ def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
 
 def explain_requirement(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> str:
     """Explain a requirement of a mission as text: its status, its line in the file, and the rows that judge it."""
-    title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}"
+    title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}{printable(own_id(requirement))}"
     return _text(
         mission,
         title,
-        [*_lines(finding_of(mission, findings, requirement)), "", requirement_finding(requirement, findings)],
+        [
+            *_lines(finding_of(mission, findings, requirement)),
+            "",
+            *map(printable, findings.texts_of(requirement)),
+            printable(requirement_finding(requirement, findings)),
+        ],
     )
 
 

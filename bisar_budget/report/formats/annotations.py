@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.error_kinds import SumKind
-from bisar_budget.faults import Fault, Place, Region, changes_words, printable
+from bisar_budget.faults import Fault, Place, Region, changes_words, printable, sentences
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import AppliedWaiver, Row, worst_first
@@ -23,6 +23,7 @@ from bisar_budget.report.words.requirements import (
     requirement_finding,
     requirement_id,
     share_columns,
+    shown_ids,
     unseen,
 )
 from bisar_budget.report.words.sentences import (
@@ -81,9 +82,15 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
         for row in worst_first(mission.rows):
             if command := STATUS[row.status].github:
                 title = f"{STATUS[row.status].text} {row.id}"
-                yield _Annotation(command, file, _region_of(row.line), title, finding(row, mission))
+                yield _Annotation(command, file, _region_of(row.line), title, _finding(row, mission))
         for warning in mission.warnings:
             yield _Annotation("warning", file, _region_of(warning.line), "Mission file", warning.message)
+
+
+def _finding(row: Row, mission: MissionFindings) -> str:
+    """Sentence about a row, with the ids of the requirements that the row shows."""
+    ids = shown_ids(row, mission)
+    return sentences(finding(row, mission), f"Requirement: {', '.join(ids)}" if ids else "")
 
 
 def _fault_region(fault: Fault) -> Region | None:
@@ -290,8 +297,8 @@ def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Ide
     kind = row.subject.facts
     rule = kind.name if isinstance(kind, SumKind) and kind.only_warns else row.metric
     rule = rule if rule in ANNOTATION_RULES else "other"
-    name = identity.of(row.id, row.requirement_id)
-    result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, name)
+    name = identity.of(row.id, *row.requirement_ids[:1])
+    result = _located(rule, STATUS[row.status].sarif, _finding(row, mission), row.line, artifact, name)
     result["properties"] = _properties(
         mission,
         status=row.status,
@@ -303,7 +310,7 @@ def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Ide
         utilization=row.utilization,
         margin=row.margin,
         equation=row.equation,
-        requirement_id=row.requirement_id,
+        requirement_id=", ".join(dict.fromkeys([*row.requirement_ids, *shown_ids(row, mission)])) or None,
         evidence=row.evidence,
     )
     return result | _suppressed(row.status, row.waivers, artifact)
@@ -312,7 +319,8 @@ def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Ide
 def _requirement(
     requirement: JudgedRequirement, mission: MissionFindings, artifact: _Object, identity: Identity
 ) -> _Object:
-    level, name = STATUS[requirement.status].sarif, identity.of(requirement_id(requirement))
+    level = STATUS[requirement.status].sarif
+    name = identity.of(requirement_id(requirement), *requirement.requirement_ids[:1])
     result = _located(
         requirement.key, level, requirement_finding(requirement, mission), requirement.line, artifact, name
     )
@@ -325,6 +333,7 @@ def _requirement(
         allowable=requirement.allowed,
         utilization=requirement.utilization,
         decided_by=requirement.row,
+        requirement_id=requirement.requirement_id,
         **share_columns(requirement),
     )
     return result | _suppressed(requirement.status, requirement.waivers, artifact)

@@ -65,9 +65,7 @@ CSV_COLUMNS = (
 
 
 # Columns that are fields of a row. Columns with text of the user are written apart.
-_ROW_COLUMNS = tuple(
-    column for column in CSV_COLUMNS if column in Row._fields and column not in ("requirement_id", "evidence")
-)
+_ROW_COLUMNS = tuple(column for column in CSV_COLUMNS if column in Row._fields and column != "evidence")
 _values_of = attrgetter(*_ROW_COLUMNS)
 
 
@@ -156,6 +154,7 @@ def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
         "allowable": requirement.allowed,
         "utilization": requirement.utilization,
         "line": requirement.line,
+        "requirement_id": requirement.requirement_id,
         "reason": requirement.reason,
         "notes": "; ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)]),
         "kind": "requirement",

@@ -42,7 +42,7 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 
 
 # Keys of a row's values in the contract, in the order of the fields of `Row` before `waivers`.
-_RENAMED = {"subject": "id", "remarks": "notes"}
+_RENAMED = {"subject": "id", "remarks": "notes", "requirement_ids": "requirement_id"}
 _ROW_KEYS = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
 _INDENTED_LEVELS, _MARGIN = 2, "    "  # of a mission and of its rows; the content of a row stays on its line
 
@@ -181,6 +181,7 @@ def _mission(mission: MissionFindings) -> dict[str, object]:
         "monte_carlo": None if mission.monte_carlo is None else monte_carlo_item(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict_item(verdict) for verdict in mission.verdicts],
         **({} if mission.study is None else {"sweep": _study(mission.study)}),
+        **({"requirement_texts": dict(mission.requirement_texts)} if mission.requirement_texts else {}),
     }
 
 
@@ -208,6 +209,7 @@ def verdict_item(verdict: Verdict) -> dict[str, object]:
 
 def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
     item: dict[str, object] = requirement._asdict()
+    item["requirement_id"] = requirement.requirement_id
     item["waivers"] = [waiver.words for waiver in requirement.waivers]
     item["share"] = None if requirement.share is None else asdict(requirement.share)
     item["waived_by"] = [waiver.id for waiver in requirement.waived_by]
@@ -220,9 +222,11 @@ def _row(row: Row) -> dict[str, object]:
     item |= {
         "id": row.id,
         "notes": notes,
+        "requirement_id": row.requirement_id,
         "waived_by": [waiver.id for waiver in row.waived_by],
         "reason_code": None if row.reason is None else row.reason.code,
         "note_codes": [note.code for note in notes],
+        "requirement_ids": row.requirement_ids,
     }
     return item
 

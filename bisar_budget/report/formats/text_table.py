@@ -142,7 +142,16 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
-    """Yield the lines for one requirement in the table. A long id of the deciding row is put on the next line."""
+    """Yield the lines for one requirement in the table, with its ids and texts in the project below it.
+
+    A long id of the deciding row is put on the next line.
+    """
+    yield from _requirement_values(line, widths, style)
+    for text in filter(None, (own_id(line.requirement).strip(), *line.texts)):
+        yield from wrapped(f"    {text}", "    ")
+
+
+def _requirement_values(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
     start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
     decided = ", ".join(filter(None, (line.decided_by, line.remark)))
     if len(start) + 10 + len(decided) <= style.table_width:

@@ -105,6 +105,8 @@ def _requirement_case(
     yield f'<testcase classname="{class_name}" name="{requirement_id(requirement)}" time="0">'
     values: tuple[tuple[str, object], ...] = (
         ("budget_status", requirement.status),
+        ("requirement_id", requirement.requirement_id),
+        ("requirement_text", " ".join(mission.texts_of(requirement)) or None),
         ("unit", requirement.unit or None),
         ("value", requirement.value),
         ("allowed", requirement.allowed),
@@ -125,6 +127,7 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
     yield f'<testcase classname="{class_name}" name="{xml_text(row.id)}" time="0">'
     values: tuple[tuple[str, object], ...] = (
         ("requirement_id", row.requirement_id),
+        ("requirement_text", " ".join(mission.texts_of(row)) or None),
         ("unit", row.unit),
         ("declared", row.declared),
         ("allowable", row.allowable),
@@ -194,7 +197,7 @@ def as_needs(report: Report, style: Style) -> str:
     """Write `needs.json` with a need for each requirement and row; an unusable file is one need of status `error`.
 
     Needs use only fields that every project of Sphinx-Needs has, so that an import gives no warning. The requirement
-    id of the project becomes a link. Numbers are in the content, which Sphinx reads as reStructuredText.
+    ids of the project become links. Numbers are in the content, which Sphinx reads as reStructuredText.
     """
     needs: list[_NamedNeed] = []
     for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
@@ -203,9 +206,10 @@ def as_needs(report: Report, style: Style) -> str:
             needs.append((identity.of("mission"), _unusable_need(mission, file)))
             continue
         for requirement in mission.requirements:
-            needs.append((identity.of(requirement_id(requirement)), _requirement_need(requirement, mission, file)))
+            name = identity.of(requirement_id(requirement), *requirement.requirement_ids[:1])
+            needs.append((name, _requirement_need(requirement, mission, file)))
         for row in mission.rows:
-            needs.append((identity.of(row.id, row.requirement_id), _row_need(row, mission, file)))
+            needs.append((identity.of(row.id, *row.requirement_ids[:1]), _row_need(row, mission, file)))
     return needs_document(report.version, "BUDGET", needs)
 
 
@@ -240,15 +244,20 @@ def _unused(identifier: str, needs: Container[str]) -> str:
 
 
 def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, object]:
-    texts = [measure(row, mission), cause(row), f"From {row.equation}."]
+    texts = [*mission.texts_of(row), measure(row, mission), cause(row), f"From {row.equation}."]
     texts += [f"Evidence: {row.evidence}"] if row.evidence else []
-    texts += _origin(row.line, mission, file)
-    return _need(f"{row.id} of {mission.name}", row.status, texts, row.metric, link=row.requirement_id)
+    texts += origin(row.line, mission, file)
+    return _need(f"{row.id} of {mission.name}", row.status, texts, row.metric, links=row.requirement_ids)
 
 
 def _requirement_need(requirement: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, object]:
-    texts = [requirement_finding(requirement, mission), *_origin(requirement.line, mission, file)]
-    return _need(f"{requirement.name} of {mission.name}", requirement.status, texts, "requirement", requirement.key)
+    texts = [
+        *mission.texts_of(requirement),
+        requirement_finding(requirement, mission),
+        *origin(requirement.line, mission, file),
+    ]
+    title, tags = f"{requirement.name} of {mission.name}", ("requirement", requirement.key)
+    return _need(title, requirement.status, texts, *tags, links=requirement.requirement_ids)
 
 
 def _unusable_need(mission: UnusableMission, file: str) -> dict[str, object]:
@@ -256,18 +265,18 @@ def _unusable_need(mission: UnusableMission, file: str) -> dict[str, object]:
     return _need(f"{file} cannot be used", mission.status, texts)
 
 
-def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str | None = None) -> dict[str, object]:
+def _need(title: str, status: str, texts: Sequence[str], *tags: str, links: Sequence[str] = ()) -> dict[str, object]:
     return {
         "type": "test",
         "title": need_text(title),
         "status": status,
         "tags": ["bisar-budget", *tags],
-        "links": [need_text(link)] if link else [],
+        "links": [need_text(link) for link in links],
         "content": "\n\n".join(rst_text(text) for text in texts if text),
     }
 
 
-def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
+def origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
     """Yield texts on where a value comes from: file and line, then changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:

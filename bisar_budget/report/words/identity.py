@@ -7,10 +7,11 @@ link to the same file all give the same name.
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.report import Style
 
 _STANDARD_INPUT = "standard input"
@@ -27,7 +28,7 @@ class Identity(NamedTuple):
     shared: frozenset[tuple[str, str]] = frozenset()
 
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
-        """Unique name of a row or requirement: its requirement id in the project, and its id `subject`.
+        """Unique name of a row or requirement: its first requirement id in the project, and its id `subject`.
 
         If it has no requirement id, the mission name comes first. If the pair is in `shared`, the mission name is
         inserted between the two.
@@ -169,16 +170,23 @@ def _with_folders(file: str, path: str, count: int) -> str:
     return "/".join(folders[-length:]) if length <= len(folders) else full_path
 
 
+def _own_ids(mission: MissionFindings) -> Iterator[tuple[str, str]]:
+    """Yield the ids of rows and requirements that have requirement ids, each with the first of these."""
+    for requirement in mission.requirements:
+        if requirement.requirement_ids:
+            yield id_of_requirement(requirement.key), requirement.requirement_ids[0]
+    yield from ((row.id, row.requirement_ids[0]) for row in mission.rows if row.requirement_ids)
+
+
 def _shared_requirements(
     missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
     """Pairs of requirement id and row id that occur in several files, or whose requirement id is a mission name."""
     used = {
-        (row.requirement_id, row.id, file)
+        (own_id, subject, file)
         for mission, file in zip(missions, files, strict=True)
         if isinstance(mission, MissionFindings)
-        for row in mission.rows
-        if row.requirement_id is not None
+        for subject, own_id in _own_ids(mission)
     }
     uses = Counter((requirement_id, row_id) for requirement_id, row_id, _ in used)
     taken = set(names.values())

@@ -10,9 +10,11 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.findings.requirement import DecidingShare, DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
+from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import Note
 from bisar_budget.report.words.sentences import (
     counted,
+    own_id,
     requirement_limit,
     requirement_size,
     use_words,
@@ -29,7 +31,7 @@ class RequirementLine(NamedTuple):
 
     `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` names the share of the
     requirement to which the utilization `use` refers, with the reached and allowed values of the share. It also has
-    the autofocus gain and the waivers.
+    the autofocus gain and the waivers. `texts` are the texts of its requirement ids.
     """
 
     requirement: JudgedRequirement
@@ -40,11 +42,12 @@ class RequirementLine(NamedTuple):
     status: str
     decided_by: str
     remark: str
+    texts: tuple[str, ...] = ()
 
 
 def requirement_id(requirement: JudgedRequirement) -> str:
     """Id of a requirement, such as `requirement.islr`, for lists that also contain rows."""
-    return f"requirement.{requirement.key}"
+    return id_of_requirement(requirement.key)
 
 
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
@@ -62,6 +65,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
             decided_by=(requirement.reason if is_open and requirement.reason else requirement.row)
             or ("" if remark else "-"),
             remark=remark,
+            texts=tuple(mission.texts_of(requirement)),
         )
 
 
@@ -120,7 +124,7 @@ _HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error
 
 def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings) -> str:
     """Sentence with the status, values and remarks of a requirement, and with the confidence if it is met."""
-    text = requirement.name
+    text = f"{requirement.name}{own_id(requirement)}"
     if requirement.value is not None:
         limit = requirement_limit(requirement.value, requirement)
         text += f" of {limit}{' (default)' if requirement.is_default else ''}"
@@ -236,6 +240,22 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
         if requirement.status in (*BROKEN, "waived")
         and not any(statuses.get(row) == requirement.status for row in requirement.rows)
     ]
+
+
+def shown_ids(row: Row, mission: MissionFindings) -> list[str]:
+    """Requirement ids of the broken or waived requirements that a row shows, because it has the same status.
+
+    Formats that list only findings do not list these requirements again (`unseen`).
+    """
+    ids = [
+        own_id
+        for requirement in mission.requirements
+        if requirement.status in (*BROKEN, "waived")
+        and requirement.status == row.status
+        and row.id in requirement.rows
+        for own_id in requirement.requirement_ids
+    ]
+    return list(dict.fromkeys(ids))
 
 
 def declared_words(kinds: DeclaredKinds) -> str:

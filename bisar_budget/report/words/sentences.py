@@ -72,9 +72,9 @@ def use_words(use: float | None) -> str:
     return "-" if use is None else percent(use)
 
 
-def own_id(row: Row) -> str:
-    """Requirement id that the file gives to a row, in brackets after a space; empty if it gives none."""
-    return f" [{row.requirement_id}]" if row.requirement_id else ""
+def own_id(judged: Row | JudgedRequirement) -> str:
+    """Requirement ids of a row or a requirement, in brackets after a space; empty if the file gives it no id."""
+    return f" [{judged.requirement_id}]" if judged.requirement_ids else ""
 
 
 def measure(row: Row, mission: MissionFindings) -> str:

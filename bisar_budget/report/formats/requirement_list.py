@@ -1,0 +1,69 @@
+"""Write the requirements of missions as CSV with their status, in the columns of a requirements file and more.
+
+A line has a requirement id of the project, with the requirement or row that has it; a requirement without such an id
+has one line. A mission reads the file with `requirements: {file: …}` and ignores the columns behind `limit`.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bisar_budget.faults import Place
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import DECLARE
+from bisar_budget.report import Piece, Style
+from bisar_budget.report.formats.csv_table import csv_text
+from bisar_budget.report.words.heading import overrides_words
+from bisar_budget.report.words.requirements import requirement_finding, requirement_lines
+from bisar_budget.report.words.sentences import finding, row_size, shown_use, use_words
+
+_STATUS_COLUMNS = (
+    *("id", "text", "key", "limit"),
+    *("status", "reached", "use", "decided_by", "file", "finding", "overrides"),
+)
+
+
+def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
+    """Write the lines of a mission, without the header. A file that cannot be used has a line with its status."""
+    if isinstance(mission, UnusableMission):
+        faults = "; ".join(map(str, mission.faults))
+        return csv_text([["", "", "", "", mission.status, "", "", "", mission.file, faults, ""]])
+    return csv_text([*_requirements(mission), *_rows(mission)])
+
+
+def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
+    """Write the lines of all missions below a header."""
+    return csv_text([_STATUS_COLUMNS]) + "".join(piece.text for piece in pieces)
+
+
+def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
+    for line in requirement_lines(mission):
+        requirement = line.requirement
+        sizes = (requirement.status, line.reached, line.use, requirement.row or "")
+        result = [*sizes, mission.file, requirement_finding(requirement, mission), overrides_words(mission)]
+        for own_id in requirement.requirement_ids or ("",):
+            text = mission.requirement_texts.get(own_id, "")
+            yield [own_id, text, requirement.key, limit_of_file(requirement, mission), *map(_or_empty, result)]
+
+
+def _rows(mission: MissionFindings) -> Iterator[list[str]]:
+    for row in mission.rows:
+        sizes = (row.status, row_size(row.declared, row, mission), use_words(shown_use(row)), row.id)
+        result = [*sizes, mission.file, finding(row, mission), overrides_words(mission)]
+        for own_id in row.requirement_ids:
+            yield [own_id, mission.requirement_texts.get(own_id, ""), row.id, "", *map(_or_empty, result)]
+
+
+def _or_empty(cell: str) -> str:
+    return "" if cell == "-" else cell
+
+
+def limit_of_file(requirement: JudgedRequirement, mission: MissionFindings) -> str:
+    """Limit of a requirement as the file writes it, or with all digits if the file does not state it."""
+    if requirement.key == DECLARE or requirement.value is None:
+        return ", ".join(mission.kinds.required)
+    if isinstance(requirement.line, Place) and not requirement.is_default and requirement.line.text:
+        return requirement.line.text
+    if requirement.unit == "rad":
+        return f"{math.degrees(requirement.value):.15g} deg"
+    return f"{requirement.value!r} {requirement.unit}"

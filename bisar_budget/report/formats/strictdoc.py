@@ -1,0 +1,218 @@
+"""Write documents for StrictDoc: the requirements of missions, with the results of their check.
+
+The syntax is that of StrictDoc 0.30 (user guide, "Document syntax"). Texts are plain, not reStructuredText.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from bisar_budget.faults import printable
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.status import worst
+from bisar_budget.report import Style
+from bisar_budget.report.formats.requirement_list import limit_of_file
+from bisar_budget.report.formats.traceability import identifier, origin
+from bisar_budget.report.words.identity import Identity, distinct, identities
+from bisar_budget.report.words.requirements import requirement_finding, requirement_id
+from bisar_budget.report.words.sentences import finding, row_limit
+
+
+@dataclass(frozen=True)
+class StrictNode:
+    """A node of a StrictDoc document: its fields in the order of the grammar, and the UIDs of its parents."""
+
+    fields: Mapping[str, str]
+    parents: Sequence[str] = ()
+    tag: str = "REQUIREMENT"
+
+
+def strict_document(title: str, grammar: Mapping[str, Mapping[str, bool]], nodes: Iterable[StrictNode]) -> str:
+    """Write a document in the format of StrictDoc. Fields without text are left out.
+
+    Parameters
+    ----------
+    title : str
+        Title of the document.
+    grammar : mapping
+        Fields of the nodes by tag; for each field, whether it is required.
+    nodes : iterable of StrictNode
+        The nodes, in order.
+    """
+    lines = ["[DOCUMENT]", f"TITLE: {printable(title)}", "OPTIONS:", "  MARKUP: Text", "", "[GRAMMAR]", "ELEMENTS:"]
+    for tag, fields in grammar.items():
+        lines += [f"- TAG: {tag}", "  FIELDS:"]
+        for name, is_required in fields.items():
+            lines += [f"  - TITLE: {name}", "    TYPE: String", f"    REQUIRED: {is_required}"]
+        lines += ["  RELATIONS:", "  - TYPE: Parent"]
+    lines.append("")
+    for node in nodes:
+        lines.append(f"[{node.tag}]")
+        lines += [f"{name}: {printable(text).strip()}" for name, text in node.fields.items() if text.strip()]
+        lines += ["RELATIONS:"] if node.parents else []
+        lines += [line for parent in node.parents for line in ("- TYPE: Parent", f"  VALUE: {parent}")]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def strict_uid(own_id: str) -> str:
+    """Requirement id of the project as a UID; characters that StrictDoc does not accept become underscores."""
+    uid = re.sub(r"[^\w()\-/.: ]", "_", own_id.strip())
+    return uid if re.match(r"\w", uid) else f"_{uid}"
+
+
+# ---------------------------------------------------------------------- requirements of missions
+_NAME_PREFIX = "BUDGET"  # of ids that the project does not give, as in needs.json
+_RESULT = "RESULT"
+_CHECK_GRAMMAR = {
+    "REQUIREMENT": {
+        "UID": True,
+        "STATUS": True,
+        "TITLE": True,
+        "STATEMENT": True,
+        "KEY": False,
+        "LIMIT": False,
+    },
+    _RESULT: {"UID": True, "STATUS": True, "TITLE": True, "STATEMENT": True, "COMMENT": False},
+}
+_UidName = tuple[str, ...]  # an id of the project, or the name of a finding as in needs.json
+
+
+@dataclass
+class _Required:
+    """A requirement of the document, which several missions, requirements and rows may have in common."""
+
+    titles: list[str] = field(default_factory=list)
+    statements: list[str] = field(default_factory=list)
+    statuses: list[str] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+    limits: list[str] = field(default_factory=list)
+
+    def node(self, uid: str) -> StrictNode:
+        """Node of the requirement with the given UID; its status is the worst."""
+        fields = {"UID": uid, "STATUS": worst(self.statuses), "TITLE": _unique(self.titles)}
+        texts = {"STATEMENT": _unique(self.statements, " "), "KEY": _unique(self.keys), "LIMIT": _unique(self.limits)}
+        return StrictNode(fields | texts)
+
+
+@dataclass
+class _Result:
+    """Result of a check, and the names of the requirements above it."""
+
+    status: str
+    title: str
+    statement: str
+    origin: str = ""
+    required: list[_UidName] = field(default_factory=list)
+
+
+def _unique(texts: Sequence[str], separator: str = "; ") -> str:
+    """Join different texts."""
+    return separator.join(dict.fromkeys(filter(None, texts)))
+
+
+def as_sdoc(report: Report, style: Style) -> str:
+    """Write the requirements of missions, each with the results that decide its status as nodes below it.
+
+    A requirement has the ids that the project gives to it, or else an id as in `needs.json`. An id that several
+    requirements, rows or missions have is one node with the worst status. A result is the row that decides a
+    requirement, a row with an id of the project, or a requirement that no row decides. A mission file that cannot be
+    used is a result without a requirement.
+    """
+    required: dict[_UidName, _Required] = {}
+    results: dict[_UidName, _Result] = {}
+    for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
+        if isinstance(mission, UnusableMission):
+            text = "; ".join(map(str, mission.faults))
+            results[identity.of("mission")] = _Result(mission.status, f"{identity.path} cannot be used", text)
+        else:
+            _add_requirements(mission, identity, required, results)
+            _add_rows(mission, identity, required, results)
+    names = [*required, *results]
+    spellings = [strict_uid(name[0]) if len(name) == 1 else identifier(_NAME_PREFIX, name) for name in names]
+    uids = dict(zip(names, distinct(spellings, names), strict=True))
+    nodes = [node.node(uids[name]) for name, node in required.items()]
+    for name, result in results.items():
+        fields = {"UID": uids[name], "STATUS": result.status, "TITLE": result.title}
+        fields |= {"STATEMENT": result.statement, "COMMENT": result.origin}
+        parents = [uids[parent] for parent in dict.fromkeys(result.required)]
+        nodes.append(StrictNode(fields, parents, _RESULT))
+    title = f"requirements and results, by bisar-budget {report.version}"
+    return strict_document(title, _CHECK_GRAMMAR, nodes)
+
+
+def _add_requirements(
+    mission: MissionFindings,
+    identity: Identity,
+    required: dict[_UidName, _Required],
+    results: dict[_UidName, _Result],
+) -> None:
+    """Add the requirements of a mission, and the row that decides each of them, or its own result without a row."""
+    rows = {row.id: row for row in mission.rows}
+    for requirement in mission.requirements:
+        name = identity.of(requirement_id(requirement))
+        above: list[_UidName] = [(own_id,) for own_id in requirement.requirement_ids] or [name]
+        for requirement_name in above:
+            node = required.setdefault(requirement_name, _Required())
+            node.titles.append(f"{requirement.name} of {mission.name}")
+            node.statements.append(_text_of(requirement_name, mission) or _sentence(requirement, mission))
+            node.statuses.append(requirement.status)
+            node.keys.append(requirement.key)
+            node.limits.append(limit_of_file(requirement, mission))
+        row = rows.get(requirement.row or "")
+        if row is not None:
+            _result_of(row, mission, identity, results).required += above
+        else:
+            result_name = (*name, "result")
+            title, text = f"result for {requirement.name}, {mission.name}", requirement_finding(requirement, mission)
+            origin_words = _origin_words(requirement.line, mission, identity)
+            results[result_name] = _Result(requirement.status, title, text, origin_words, list(above))
+
+
+def _add_rows(
+    mission: MissionFindings,
+    identity: Identity,
+    required: dict[_UidName, _Required],
+    results: dict[_UidName, _Result],
+) -> None:
+    """Add the requirement ids that a mission gives to rows, with the results of these rows."""
+    for row in mission.rows:
+        for own_id in row.requirement_ids:
+            node = required.setdefault((own_id,), _Required())
+            node.titles.append(f"{row.id} of {mission.name}")
+            node.statements.append(mission.requirement_texts.get(own_id) or _row_sentence(row, mission))
+            node.statuses.append(row.status)
+            node.keys.append(row.id)
+            _result_of(row, mission, identity, results).required.append((own_id,))
+
+
+def _result_of(row: Row, mission: MissionFindings, identity: Identity, results: dict[_UidName, _Result]) -> _Result:
+    """Result of a row, which is added if it is not among the results yet."""
+    texts = (f"{row.id} of {mission.name}", finding(row, mission), _origin_words(row.line, mission, identity))
+    return results.setdefault(identity.of(row.id), _Result(row.status, *texts))
+
+
+def _origin_words(line: int | None, mission: MissionFindings, identity: Identity) -> str:
+    return "; ".join(origin(line, mission, identity.path))
+
+
+def _text_of(name: _UidName, mission: MissionFindings) -> str:
+    """Text that the mission states for an id of the project; empty for the name of a finding."""
+    return mission.requirement_texts.get(name[0], "") if len(name) == 1 else ""
+
+
+def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
+    """Write a requirement without a text of its own as a sentence."""
+    limit = limit_of_file(requirement, mission)
+    if requirement.key == DECLARE:
+        return f"The mission file shall declare the errors {limit}."
+    return f"The {requirement.name} shall be at most {limit}."
+
+
+def _row_sentence(row: Row, mission: MissionFindings) -> str:
+    """Write a row without a text of its own as a requirement in one sentence."""
+    if row.allowable is None:
+        return f"{row.id} shall comply with the budget."
+    return f"{row.id} shall be at most {row_limit(row, mission)}."
