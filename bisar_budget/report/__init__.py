@@ -32,6 +32,11 @@ class Format(NamedTuple):
     is_illustrated: bool = False
     has_pictures: bool = False
 
+    @property
+    def name_and_about(self) -> str:
+        """Name of the format, with its description in brackets if it has one."""
+        return f"{self.name} ({self.about})" if self.about else self.name
+
 
 _FORMAT_ENTRIES = (
     Format("text", "formats.text_table", (".txt",), is_piecewise=True),
