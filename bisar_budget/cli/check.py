@@ -192,7 +192,8 @@ class _Draws(ParamType[int]):
 @MISSIONS_OR_NONE
 @format_option(
     FORMATS,
-    f"Format of the report; {', '.join(f'{form.name}: {form.about}' for form in FORMATS.values() if form.about)}.",
+    f"Format of the report: {', '.join(form.name_and_about for form in FORMATS.values())}.",
+    metavar="FORMAT",
     envvar="BISAR_BUDGET_FORMAT",
 )
 @output_option("Write the report to FILE instead of standard output.")

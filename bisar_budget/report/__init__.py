@@ -34,6 +34,11 @@ class Format(NamedTuple):
     has_pictures: bool = False
     is_binary: bool = False
 
+    @property
+    def name_and_about(self) -> str:
+        """Name of the format, with its description in brackets if it has one."""
+        return f"{self.name} ({self.about})" if self.about else self.name
+
 
 _FORMAT_ENTRIES = (
     Format("text", "formats.text_table", (".txt",), is_piecewise=True),

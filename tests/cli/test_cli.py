@@ -269,7 +269,7 @@ class TestInit:
         """Uncomment each optional block: what the starter suggests must load."""
         text = run("init", "-").stdout
         text, count = re.subn(r"(?m)^(\s*)# (\s*(?:- \{)?[a-z_]+: .*)$", r"\1\2", text)
-        assert count == 25
+        assert count == 26
         path = tmp_path / "m.yaml"
         path.write_text(text)
         result = run("check", path, "--format", "json")
