@@ -286,6 +286,8 @@ def _form(reader: readers.Reader) -> str:
     }
     if isinstance(reader, readers.TextMap):
         return f"{reader.of}: text"
+    if isinstance(reader, readers.IdMap):
+        return "id of a row or a requirement: text, or list of texts"
     for kind, word in words.items():
         if isinstance(reader, kind):
             return word
