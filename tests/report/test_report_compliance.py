@@ -24,8 +24,8 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.document import (
+    AnswerDocument,
     Badge,
-    Compliance,
     Facts,
     Items,
     Name,
@@ -102,7 +102,7 @@ def plain(text: Text) -> str:
     return "".join(str(word) for word in words)
 
 
-def lines(document: Compliance, *heads: str) -> list[dict[str, Text]]:
+def lines(document: AnswerDocument, *heads: str) -> list[dict[str, Text]]:
     """Lines of all tables with these columns, by the heads of the columns."""
     found = []
     for table in blocks_of(document):
@@ -112,20 +112,20 @@ def lines(document: Compliance, *heads: str) -> list[dict[str, Text]]:
     return found
 
 
-def matrix(document: Compliance) -> dict[str, dict[str, str]]:
+def matrix(document: AnswerDocument) -> dict[str, dict[str, str]]:
     """Words of the compliance matrix, with what the annex has of it, by the id of the row."""
     return {parts(line["Id"])[0].text: {head: plain(cell) for head, cell in line.items()}
             for line in lines(document, "Id", "Verified by")}  # fmt: skip
 
 
-def facts(document: Compliance, style: str) -> list[tuple[str, str]]:
+def facts(document: AnswerDocument, style: str) -> list[tuple[str, str]]:
     """Names of facts, and what they are, in all lists of a style."""
     pairs = [pair for block in blocks_of(document) if isinstance(block, Facts) and block.style == style
              for pair in block.pairs]  # fmt: skip
     return [(plain(name), plain(words)) for name, words in pairs]
 
 
-def drivers(document: Compliance) -> list[tuple[str, str, float]]:
+def drivers(document: AnswerDocument) -> list[tuple[str, str, float]]:
     """Id, status and bar of each row that drives the verdict."""
     found = []
     for block in blocks_of(document):
