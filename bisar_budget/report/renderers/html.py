@@ -18,6 +18,7 @@ from bisar_budget.resources import resource
 _BREAK_POINT = re.compile(
     r"([._/])(?=\w{2})"
 )  # where a long name may break; one-letter axes stay with the name before
+_LONG_WORD = re.compile(r"\S{30}(?=\S)")  # may break after it, where no line is as wide
 _BAR_ATTRIBUTES = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
 _USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # a utilization of 100 % is at 96
 _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
@@ -63,7 +64,7 @@ def _text(text: doc.Text) -> Markup:
         case tuple():
             return Markup("").join(map(_text, text))
         case doc.Name(words, target):
-            broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(escape(printable(words)))))
+            broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(_plain(words))))
             return Markup('<a href="#{}">{}</a>').format(target, broken) if target else broken
         case doc.Styled(style, inner):
             return Markup('<span class="{}">{}</span>').format(style, _text(inner))
@@ -82,7 +83,14 @@ def _text(text: doc.Text) -> Markup:
             return Markup(f'<span class="swatch {owner}" aria-hidden="true"></span>')
         case doc.Code(words):
             return Markup("<code>{}</code>").format(printable(words))
-    return escape(printable(text))
+    return _plain(text)
+
+
+def _plain(text: str) -> Markup:
+    """Write text, in which a long word without a place to break gets some."""
+    shown_text = printable(text)
+    pieces = _LONG_WORD.sub("\\g<0>\n", shown_text).split("\n") if len(shown_text) > 30 else [shown_text]
+    return Markup("<wbr>").join(pieces)
 
 
 def _fill(width: float) -> str:
