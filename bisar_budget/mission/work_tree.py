@@ -18,18 +18,20 @@ class WorkTree(NamedTuple):
     """The commit that is checked out in the git repository of a mission, and files that differ from it.
 
     `commit` is the hash of the commit; empty if there is none, and `reason` is then the sentence that says why.
-    `changed` are the committed files of the repository with changes, and `new` are inputs that were never committed.
+    `changed` are the committed files of the repository with changes. Among the inputs of the mission,
+    `changed_inputs` are those with changes, and `new_inputs` those that were never committed.
     """
 
     commit: str = ""
     reason: str = ""
     changed: tuple[str, ...] = ()
-    new: tuple[str, ...] = ()
+    changed_inputs: tuple[str, ...] = ()
+    new_inputs: tuple[str, ...] = ()
 
     @property
     def is_clean(self) -> bool:
         """Whether there is a commit from which no committed file and no input differs."""
-        return bool(self.commit) and not self.changed and not self.new
+        return bool(self.commit) and not self.changed and not self.new_inputs
 
 
 _UNREAD = "in a git repository that git does not read"
@@ -54,12 +56,12 @@ def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
             tops[folder] = top.removesuffix("\n") if is_read else ""
             states.setdefault(tops[folder], _state(tops[folder]) if is_read else WorkTree(reason=top or _UNREAD))
         state = states[tops[folder]]
-        states[file] = _with_new(state, tops[folder], [file, *others]) if state.commit else state
+        states[file] = _with_inputs(state, tops[folder], [file, *others]) if state.commit else state
     return {file: states[file] for file in inputs}
 
 
 def _state(top: str) -> WorkTree:
-    """State of the repository with the top folder `top`, without its new files."""
+    """State of the repository with the top folder `top`, without inputs of a mission."""
     is_read, commit = _git(top, "rev-parse", "--verify", "--quiet", "HEAD^{commit}")
     if not is_read:
         return WorkTree(reason=commit or "in a git repository without a commit")
@@ -69,8 +71,8 @@ def _state(top: str) -> WorkTree:
     return WorkTree(commit.strip(), changed=tuple(sorted(entry[3:] for entry in listed.split("\0") if entry)))
 
 
-def _with_new(state: WorkTree, top: str, files: Sequence[str]) -> WorkTree:
-    """Return the state of a repository with the files among `files` that are in its folder, and were never committed.
+def _with_inputs(state: WorkTree, top: str, files: Sequence[str]) -> WorkTree:
+    """Return the state of a repository with the inputs `files` of a mission, as far as they are in its folder.
 
     A file that was only added to the index counts as changed.
     """
@@ -83,7 +85,10 @@ def _with_new(state: WorkTree, top: str, files: Sequence[str]) -> WorkTree:
     if not names:
         return state
     _, tracked = _git(top, "--literal-pathspecs", "ls-files", "-z", "--", *sorted(names))
-    return state._replace(new=tuple(sorted(names.difference(tracked.split("\0"), state.changed))))
+    return state._replace(
+        changed_inputs=tuple(sorted(names.intersection(state.changed))),
+        new_inputs=tuple(sorted(names.difference(tracked.split("\0"), state.changed))),
+    )
 
 
 def _is_below_git(folder: str) -> bool:

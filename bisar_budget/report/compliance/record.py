@@ -10,7 +10,7 @@ from bisar_budget.report.compliance.rows import Page
 from bisar_budget.report.words.heading import document_words
 from bisar_budget.report.words.sentences import counted
 
-_LISTED_FILE_COUNT = 3  # changed files that a report names
+_LISTED_FILE_COUNT = 3  # inputs that a fact names
 
 
 def document_facts(document: Document, work_tree: WorkTree | None) -> Iterator[tuple[doc.Text, doc.Text]]:
@@ -29,15 +29,14 @@ def commit_words(work_tree: WorkTree) -> doc.Text:
     """Text with the commit of a git repository, and whether its files are as committed."""
     if not work_tree.commit:
         return work_tree.reason
-    clauses = [
-        f"{counted(len(files), noun)} {words} ({_named(files)})"
-        for files, noun, words in (
-            (work_tree.changed, "file", "changed since"),
-            (work_tree.new, "input", "never committed"),
-        )
-        if files
-    ]
-    state = "; ".join(clauses) or "clean: every file is as committed"
+    clauses = []
+    if work_tree.changed:
+        clauses.append(f"not clean, {counted(len(work_tree.changed), 'file')} changed since")
+    if work_tree.changed_inputs:
+        clauses.append(f"changed inputs: {_named(work_tree.changed_inputs)}")
+    if work_tree.new_inputs:
+        clauses.append(f"inputs never committed: {_named(work_tree.new_inputs)}")
+    state = "; ".join(clauses) or "clean"
     return "commit ", doc.Styled("digest", work_tree.commit), f", {state}"
 
 

@@ -204,7 +204,9 @@ def _provenance(report: Report) -> doc.Chapter:
         (doc.Styled("id", option.name), option.value, option.origin) for option in report.options
     ]
     columns = doc.heads("Option", "Value", "From")
-    table = doc.TextTable("Options of the run", "Options of this run", columns, options or [("none", "–", "–")])
+    table = doc.TextTable(
+        "Options of the run", "Options of this run", columns, options or [("none", "–", "–")], "options"
+    )
     return doc.Chapter("How this report was made", [doc.Paragraph(text), table], "made", level=2)
 
 
@@ -297,8 +299,8 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
         for effect in unjudged_effects(findings)
     ]
     facts.append(("Declared", f"{len(findings.kinds.declared)} of {findings.kinds.in_all} kinds of error"))
-    for name, kinds in (("Not declared", findings.kinds.missing), ("Without source", findings.kinds.without_source)):
-        facts += [(name, ", ".join(kind_names(kinds)))] if kinds else []
+    if findings.kinds.missing:
+        facts.append(("Not declared", ", ".join(kind_names(findings.kinds.missing))))
     if findings.kinds.shifted:
         facts.append(("Off the data sheet", ", ".join(shifted_names(findings.kinds))))
     facts += [

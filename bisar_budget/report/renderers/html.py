@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import cache
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
@@ -18,7 +18,7 @@ from bisar_budget.resources import resource
 _BREAK_POINT = re.compile(
     r"([._/])(?=\w{2})"
 )  # where a long name may break; one-letter axes stay with the name before
-_LONG_WORD = re.compile(r"\S{30}(?=\S)")  # may break after it, where no line is as wide
+_LONG_WORD = re.compile(r"[^\s._/-]{30}(?=[^\s._/-])")  # may break after it, where no line is as wide
 _BAR_ATTRIBUTES = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
 _USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # a utilization of 100 % is at 96
 _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
@@ -66,6 +66,8 @@ def _text(text: doc.Text) -> Markup:
         case doc.Name(words, target):
             broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(_plain(words))))
             return Markup('<a href="#{}">{}</a>').format(target, broken) if target else broken
+        case doc.Styled("digest", str(digest)):  # without places to break, so that a search finds it
+            return Markup('<span class="digest">{}</span>').format(printable(digest))
         case doc.Styled(style, inner):
             return Markup('<span class="{}">{}</span>').format(style, _text(inner))
         case doc.Badge(status):
