@@ -374,7 +374,7 @@ def check(
         statuses = {file: each.statuses for file, each in texts.items()}
     else:
         from bisar_budget.findings.mission import Report
-        from bisar_budget.front.checks import checked, drawn_by
+        from bisar_budget.front.checks import checked, drawn_by, with_work_trees
         from bisar_budget.mission.quantities import QuestionError
 
         settings: Arguments = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
@@ -397,7 +397,8 @@ def check(
             reported = [each.name for mission in its_missions for each in getattr(mission, "overrides", ())]
             shown_day = judged_on if is_given or "--date" in reported else None
             options = dict.fromkeys(option for project in of for option in _options(project, shown_day, today))
-            return Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
+            made = Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
+            return with_work_trees(made) if illustrated else made
 
         report = report_of(projects, files)
         if says_faults:

@@ -12,6 +12,7 @@ from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
+from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.resolution import Resolution
 
@@ -161,13 +162,15 @@ class Report(NamedTuple):
     """The findings about all mission files of a run.
 
     `options` are the options of the run that affect its results. `day` is the date that the user gave, or on which
-    waivers were judged; None if no verdict depends on the date.
+    waivers were judged; None if no verdict depends on the date. `work_trees` are the states of the git repositories
+    of mission files, by the paths of these files; only compliance reports show them.
     """
 
     version: str
     missions: tuple[MissionFindings | UnusableMission, ...]
     options: tuple[Override, ...] = ()
     day: date | None = None
+    work_trees: Mapping[str, WorkTree] = {}
 
     @property
     def status(self) -> str:

@@ -20,7 +20,7 @@ from bisar_budget.budget.check import (
     without_analysis,
 )
 from bisar_budget.faults import SetValue, printable
-from bisar_budget.findings.mission import FileWarning, MissionFindings
+from bisar_budget.findings.mission import FileWarning, MissionFindings, Report
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside, Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front.progress import foreseen, foretell, watched, workers_of
@@ -432,3 +432,17 @@ def _with_sheet(findings: MissionFindings, model: str | None, today: dt.date) ->
             mission.line(("allocation", "specify")), phrases.note("no-specifications", why=str(error))
         )
         return findings._replace(warnings=(*findings.warnings, warning))
+
+
+# ---------------------------------------------------------------------- repositories
+def with_work_trees(report: Report) -> Report:
+    """Add the states of the git repositories of the mission files to a report, for the formats that show them."""
+    from bisar_budget.mission.inputs import input_files
+    from bisar_budget.mission.work_tree import work_trees
+
+    inputs: dict[str, list[str]] = {}
+    for findings in report.missions:
+        mission = findings.mission if isinstance(findings, MissionFindings) else None
+        files = [] if mission is None else input_files(mission)
+        inputs[findings.file] = [file.path for file in files if file.path]
+    return report._replace(work_trees=work_trees(inputs))

@@ -223,9 +223,10 @@ class CheckResult(Mapping[str, Row]):
         folder = f"{os.path.splitext(name)[0]}.assets" if FORMATS[form].has_pictures else ""
         style, shown = Style(detail=detail, assets=os.path.basename(folder)), self._report
         if FORMATS[form].is_illustrated:
-            from bisar_budget.front.checks import with_sheets
+            from bisar_budget.front.checks import with_sheets, with_work_trees
 
-            shown = shown._replace(missions=tuple(with_sheets(shown.missions, self.model, self.day)))
+            missions = tuple(with_sheets(shown.missions, self.model, self.day))
+            shown = with_work_trees(shown._replace(missions=missions))
         data = content(form, shown, style)
         for picture, drawing in pictures(form, shown, style).items():
             os.makedirs(folder, exist_ok=True)

@@ -5,6 +5,7 @@ __all__ = [
     "changes",
     "covariance",
     "edited",
+    "inputs",
     "instruments",
     "load",
     "model",
@@ -18,4 +19,5 @@ __all__ = [
     "stacked",
     "tree",
     "vibrations",
+    "work_tree",
 ]

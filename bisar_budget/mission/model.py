@@ -36,6 +36,7 @@ from bisar_budget.mission.readers import (
     Glob,
     IdMap,
     Key,
+    Lines,
     ListOf,
     OneOf,
     Quantity,
@@ -62,12 +63,22 @@ if TYPE_CHECKING:
     from bisar_budget.mission.quantities import Number
 
 
+class DocumentChange(NamedTuple):
+    """An entry in the change record of a document."""
+
+    issue: Annotated[str, Key(Text(), "Issue of the document with the change.")]
+    date: Annotated[date, Key(Day(), "Day of the issue.")]
+    what: Annotated[str, Key(Text(), "Text of the change.")]
+
+
 class Document(NamedTuple):
     """The document that a report of this mission becomes; every report shows it."""
 
     number: Annotated[str | None, Key(Text())] = None
     issue: Annotated[str | None, Key(Text())] = None
     author: Annotated[str | None, Key(Text())] = None
+    applicable: Annotated[tuple[str, ...], Key(Lines(), "Applicable documents, such as standards.")] = ()
+    changes: Annotated[tuple[DocumentChange, ...], Key(ListOf(DocumentChange), "Change record, oldest first.")] = ()
 
 
 class Radar(NamedTuple):
@@ -508,7 +519,9 @@ class Mission(NamedTuple):
     radar: Annotated[Radar, Key(Section(Radar))]
     collection: Annotated[Collection, Key(Section(Collection))]
     platforms: Annotated[Platforms, Key(Section(Platforms))]
-    document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
+    document: Annotated[
+        Document, Key(Section(Document), "Number, issue, author and change record, for the reports.")
+    ] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     earth_orientation: Annotated[
         EarthOrientation | None,

@@ -415,6 +415,23 @@ class TextList(Words):
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
+class Lines(Words):
+    """A list of texts of one line, each at most once."""
+
+    def __init__(self) -> None:
+        self.word = Text()
+        self.problem = Problem(f"must be a list of at most {_MAX_ENTRY_COUNT} texts")
+        self.fewest, self.most = 0, _MAX_ENTRY_COUNT
+
+    def below(self, step: str) -> Reader[object] | None:
+        """Reader of one text in the list; None if `step` is no index."""
+        return self.word if is_index(step) else None
+
+    def schema(self, definitions: Definitions) -> JsonObject:
+        """JSON Schema: an array of texts."""
+        return {"type": "array", "items": self.word.schema(definitions), "maxItems": self.most}
+
+
 class Whole(Reader[int]):
     """A whole number within bounds."""
 

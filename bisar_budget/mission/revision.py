@@ -12,12 +12,11 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import finder_of
 from bisar_budget.mission.paths import reader_of
 from bisar_budget.mission.tree import MAX_BYTES
+from bisar_budget.mission.work_tree import VARIABLES_OF_HOOKS
 from bisar_budget.resources import DISK, UnreadableError
 
 # Modes of tree entries: a submodule, and a symbolic link.
 _SUBMODULE, _LINK = b"160000", b"120000"
-# Git sets these variables for hooks. With them, git would use another repository or another top folder.
-_VARIABLES_OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_COMMON_DIR", "GIT_NAMESPACE", "GIT_PREFIX")
 
 
 class RevisionError(Exception):
@@ -326,7 +325,7 @@ def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes,
     """
     # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
-    variables = {name: value for name, value in os.environ.items() if name not in _VARIABLES_OF_HOOKS}
+    variables = {name: value for name, value in os.environ.items() if name not in VARIABLES_OF_HOOKS}
     try:
         done = run(command, input=stdin, capture_output=True, check=False, env=variables)
     except OSError:

@@ -29,7 +29,8 @@ class Name:
 class Styled:
     """Text with a class of the style sheet. If the text fills a table cell, the cell also gets the class.
 
-    Markdown puts text of the classes `own-id` and `origin` in brackets.
+    Markdown puts text of the classes `own-id` and `origin` in brackets, and text of the class `own-text` behind a
+    colon.
     """
 
     style: str

@@ -1,14 +1,17 @@
 """Tables about the rows of a mission: the compliance matrix, and contributions to phase and displacement."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.effect import Subject, plain
 from bisar_budget.error_kinds import SourceKind
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
@@ -30,7 +33,8 @@ from bisar_budget.report.words.sentences import (
 from bisar_budget.units import format_in, format_quantity
 
 _MAX_LARGEST_ROWS = 8  # contributions in each table of a summary
-_MAX_MATRIX_ROWS = 40  # rows in a summary; the annex has the other rows, with smaller utilizations
+_MAX_MATRIX_ROWS = 20  # rows in a summary; the annex has the other rows, with smaller utilizations
+_MAX_BRIEF_ROWS = 8  # rows in the summary of one of several missions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,8 +81,8 @@ class Page:
         return [row for row in self.matrix if row.id not in self.in_summary]
 
 
-def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
-    """Return the page of a mission.
+def page_of(findings: MissionFindings, style: Style, anchor: str, *, is_brief: bool = False) -> Page:
+    """Return the page of a mission; a brief page has fewer rows.
 
     Raises
     ------
@@ -87,6 +91,7 @@ def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
     """
     rows = worst_first(findings.rows)
     important = [row for row in rows if matters(row)]
+    most = _MAX_BRIEF_ROWS if is_brief else _MAX_MATRIX_ROWS
     return Page(
         findings=findings,
         analysis=findings.analysed(),
@@ -97,7 +102,7 @@ def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
         in_summary=frozenset(
             row.id
             for index, row in enumerate(important)
-            if index < _MAX_MATRIX_ROWS or STATUS[row.status].is_explained
+            if index < most or (STATUS[row.status].is_explained and not is_brief)
         ),
         undeclared=[row for row in findings.rows if row.status == "not_declared"],
     )
@@ -379,3 +384,52 @@ def all_contributions(page: Page) -> Iterator[doc.Block]:
             columns = doc.heads(doc.Head("Id", "id"), *doc.numbers(*heads))
             lines: list[doc.Line] = [(doc.Name(error.id), error.size, *error.model_cells) for error in contributions]
             yield doc.TextTable(f"All {title} of {page.name}", caption, columns, lines, "contributions")
+
+
+# ---------------------------------------------------------------------- requirements and sources
+
+
+def verification_words(findings: MissionFindings, requirement: JudgedRequirement) -> str:
+    """Text on how this run verified a requirement: by analysis, by images at limits, by Monte Carlo draws."""
+    if requirement.is_unjudged:
+        return "none"
+    methods = ["analysis"]
+    verdicts = [verdict.verdict for verdict in findings.verdicts or () if verdict.id in requirement.rows]
+    if verdicts:
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in Counter(verdicts).items())
+        methods.append(f"image ({counts})")
+    if findings.monte_carlo is not None:
+        drawn_ids = {drawn.id for drawn in findings.monte_carlo.requirements}
+        if drawn_ids & {requirement.key, requirement.id, *requirement.rows}:
+            methods.append("Monte Carlo")
+    return ", ".join(methods)
+
+
+class Declaration(NamedTuple):
+    """Kinds of error that one platform, the clock or the mission declares from one source.
+
+    `source` is None if the file names none; `owes_source` tells whether it should.
+    """
+
+    owner: str
+    kinds: Sequence[str]
+    source: str | None
+    owes_source: bool
+
+
+def declared_by_owner(findings: MissionFindings) -> list[Declaration]:
+    """List the declared errors by their owner and source, in the order of the rows."""
+    kinds: dict[tuple[str, str | None, bool], dict[str, None]] = {}
+    for row in findings.rows:
+        kind = row.subject.facts
+        if row.declared is None or not row.is_independent or not isinstance(kind, SourceKind):
+            continue
+        owner = "both platforms" if kind.is_shared and row.subject.owner == "mission" else row.subject.owner
+        owes_source = row.evidence is None and kind.owes_source
+        words = row.subject.kind.replace("_", " ")
+        kinds.setdefault((owner, row.evidence, owes_source), {})[words] = None
+    declarations = [Declaration(owner, list(names), source, owes) for (owner, source, owes), names in kinds.items()]
+    return sorted(declarations, key=lambda declaration: _OWNERS.index(declaration.owner))
+
+
+_OWNERS = ("transmitter", "receiver", "both platforms", "clock", "mission")

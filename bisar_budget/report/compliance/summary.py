@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
+from shlex import quote
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
@@ -15,16 +16,22 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import Platforms
 from bisar_budget.mission.propagation import Propagation
+from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
-from bisar_budget.report.compliance.annex import annex, sources
+from bisar_budget.report.compliance.annex import annex
+from bisar_budget.report.compliance.overview import Entry, overview
+from bisar_budget.report.compliance.record import document_facts, record
 from bisar_budget.report.compliance.rows import (
+    Declaration,
     Page,
+    declared_by_owner,
     grouped,
     largest_contributions,
     matrix_table,
     page_of,
     undeclared_table,
+    verification_words,
 )
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.words.heading import (
@@ -38,10 +45,8 @@ from bisar_budget.report.words.heading import (
 )
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import (
-    RequirementLine,
     confidence_words,
     kind_names,
-    requirement_id,
     requirement_lines,
     shifted_names,
     unjudged_effects,
@@ -57,7 +62,6 @@ from bisar_budget.report.words.sentences import (
     requirement_size,
     sentence,
     shown_use,
-    use_words,
     waiver_names,
 )
 from bisar_budget.units import format_quantity
@@ -102,7 +106,8 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
         Findings do not contain their analysis.
     """
     count = len(report.missions)
-    index: list[doc.Line] = []
+    is_brief = count > 1 and style.detail != "full"
+    entries: list[Entry] = []
     missions, margins, annexes = [], [], []
     for number, mission in enumerate(report.missions, start=1):
         anchor = f"m{number}"
@@ -110,16 +115,17 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
             file = name = source_path(mission.file, style)
             data, document = mission.data, Document()
             blocks: list[doc.Block] = [_faults(mission, name, anchor)]
-            faults = counted(len(mission.faults), "fault")
-            index.append((doc.Name(name, anchor), doc.Name(file), doc.Badge("error"), "–", "–", faults))
+            counts = counted(len(mission.faults), "fault")
+            entries.append(Entry(name, anchor, file, "error", faults=counts))
         else:
-            page = page_of(mission, style, anchor)
+            page = page_of(mission, style, anchor, is_brief=is_brief)
             file, name, data, document = page.file, page.name, page.mission.data, mission.document
-            blocks = _summary(page)
-            index.append(_index_line(page))
+            blocks = _brief(page) if is_brief else _summary(page)
+            counts = _counts(mission)
+            entries.append(Entry(name, anchor, file, mission.status, mission))
             annexes += annex(page, several=count > 1)
         digest = "" if data is None else sha256(data).hexdigest()
-        facts = _facts_of_file(file, digest, document, index[-1][-1])
+        facts = _facts_of_file(file, digest, document, report.work_trees.get(mission.file), counts)
         missions.append(doc.Chapter(name, [facts, *blocks], anchor, level=2, is_article=True, is_listed=count == 1))
         margins.append(doc.Margins(anchor, name, document_words(document), f"SHA-256 {digest}" if digest else file))
     subject = f"{count} missions" if count > 1 else margins[0].name
@@ -127,7 +133,7 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
     about.append(("Result", (doc.Badge(report.status), " ", _overall(report))))
     about += [("Date", report.day.isoformat())] if report.day else []
     about.append(("Tool", f"bisar-budget {report.version}"))
-    sections = [_index(index)] if count > 1 else []
+    sections = [overview(entries)] if count > 1 else []
     sections += [*missions, _provenance(report), _approval(report), *annexes]
     return doc.AnswerDocument(report.version, subject, doc.Facts(about), margins, sections)
 
@@ -180,28 +186,11 @@ def _judges_each_alone(findings: MissionFindings) -> bool:
     return not findings.is_empty and findings.combine == "each"
 
 
-def _index(lines: Sequence[doc.Line]) -> doc.Chapter:
-    file, worst = doc.Head("File", "id"), doc.Head("Worst row", "id")
-    columns = doc.heads("Mission", file, "Status", worst, *doc.numbers("Use"), "Rows")
-    caption = (
-        f"{len(lines)} missions, in the order given. Use is declared over allowable. A name leads to its report."
-    )
-    table = doc.TextTable("Index of the missions", caption, columns, lines, "index")
-    return doc.Chapter("Index", [table], "summary", level=2)
-
-
-def _index_line(page: Page) -> doc.Line:
-    """Line of a mission in the index, with its worst row or with a requirement that is worse than all rows."""
-    findings, judged = page.findings, page.judged
-    deciding = [requirement_id(each) for each in findings.requirements if each.status == findings.status]
-    worst = judged[0].id if judged else ""
-    if deciding and not (judged and judged[0].status == findings.status):
-        worst = deciding[0]
-    use = shown_use(judged[0]) if judged and worst == judged[0].id else None
+def _counts(findings: MissionFindings) -> str:
+    """Text with the number of rows of each status, and with the waivers."""
     counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in findings.summary.items())
-    counts += f"; {waiver_names([waiver.id for waiver in findings.waived_by])}" if findings.waived_by else ""
-    name, decided = doc.Name(page.name, page.anchor), doc.Name(worst) if worst else "–"
-    return name, doc.Name(page.file), doc.Badge(findings.status), decided, dashed(use_words(use)), counts
+    waivers = [waiver.id for waiver in findings.waived_by]
+    return f"{counts}; {waiver_names(waivers)}" if waivers else counts
 
 
 def _provenance(report: Report) -> doc.Chapter:
@@ -214,7 +203,9 @@ def _provenance(report: Report) -> doc.Chapter:
         (doc.Styled("id", option.name), option.value, option.origin) for option in report.options
     ]
     columns = doc.heads("Option", "Value", "From")
-    table = doc.TextTable("Options of the run", "Options of this run", columns, options or [("none", "–", "–")])
+    table = doc.TextTable(
+        "Options of the run", "Options of this run", columns, options or [("none", "–", "–")], "options"
+    )
     return doc.Chapter("How this report was made", [doc.Paragraph(text), table], "made", level=2)
 
 
@@ -237,16 +228,16 @@ def _approval(report: Report) -> doc.Chapter:
 
 
 # ---------------------------------------------------------------------- one mission
-def _facts_of_file(file: str, digest: str, document: Document, counts: doc.Text) -> doc.Facts:
+def _facts_of_file(
+    file: str, digest: str, document: Document, work_tree: WorkTree | None, counts: doc.Text
+) -> doc.Facts:
     pairs: list[tuple[doc.Text, doc.Text]] = [
+        *document_facts(document, work_tree),
         ("File", doc.Styled("id", doc.Name(file))),
         ("SHA-256", doc.Styled("digest", digest or "not read")),
+        ("Rows", counts),
     ]
-    if words := document_words(document):
-        pairs.append(("Document", words + (f"; author {document.author}" if document.author else "")))
-    elif document.author:
-        pairs.append(("Author", document.author))
-    return doc.Facts([*pairs, ("Rows", counts)])
+    return doc.Facts(pairs)
 
 
 def _faults(mission: UnusableMission, name: str, anchor: str) -> doc.Chapter:
@@ -273,6 +264,20 @@ def _summary(page: Page) -> list[doc.Block]:
         doc.Chapter("Geometry", list(_geometry(page)), f"{page.anchor}-geometry"),
         doc.Chapter("Allocation", list(_allocation(page)), f"{page.anchor}-allocation", style="allocation"),
         doc.Chapter("Assumptions and validity", list(_validity(page)), f"{page.anchor}-validity"),
+        record(page),
+    ]
+
+
+def _brief(page: Page) -> list[doc.Block]:
+    """Return the chapters of a mission in a report on several: verdict, worst rows, geometry in words, inputs."""
+    command = f"bisar-budget check {quote(page.file)} --report report.html"
+    more = ("Contributions, drawings, allocation and assumptions: ", doc.Code(command), ".")
+    return [
+        doc.Chapter("Verdict", list(_verdict(page)), f"{page.anchor}-verdict", is_listed=False),
+        doc.Chapter("Compliance matrix", list(_matrix(page)), f"{page.anchor}-matrix", is_listed=False),
+        doc.Chapter("Geometry", [_geometry_facts(page)], f"{page.anchor}-geometry", is_listed=False),
+        record(page),
+        doc.Paragraph(more, "more"),
     ]
 
 
@@ -293,8 +298,8 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
         for effect in unjudged_effects(findings)
     ]
     facts.append(("Declared", f"{len(findings.kinds.declared)} of {findings.kinds.in_all} kinds of error"))
-    for name, kinds in (("Not declared", findings.kinds.missing), ("Without source", findings.kinds.without_source)):
-        facts += [(name, ", ".join(kind_names(kinds)))] if kinds else []
+    if findings.kinds.missing:
+        facts.append(("Not declared", ", ".join(kind_names(findings.kinds.missing))))
     if findings.kinds.shifted:
         facts.append(("Off the data sheet", ", ".join(shifted_names(findings.kinds))))
     facts += [
@@ -302,6 +307,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
         for index, override in enumerate(findings.overrides)
     ]
     yield doc.Facts(facts, "facts wide")
+    yield from _declarations(page)
     if narrow := narrow_gradients(findings.geometry):
         yield doc.Paragraph(narrow)
     if drivers := list(_drivers(page)):
@@ -311,33 +317,49 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
 
 
 def _requirements(page: Page) -> doc.TextTable:
+    """Make the table of requirements; it has a column for the ids of the project if the file gives any."""
     lines: list[doc.Line] = []
+    has_ids = any(requirement.requirement_ids for requirement in page.findings.requirements)
     for line in requirement_lines(page.findings):
         decided: doc.Text = dashed(line.decided_by)
         if line.decided_by == line.requirement.row:
             decided = doc.Styled("id", doc.Name(line.decided_by))
+        name: list[doc.Text] = [sentence(line.name) + (" (default)" if line.requirement.is_default else "")]
+        name += [doc.Styled("own-text", text) for text in line.texts]
         lines.append(
             (
-                _required(line),
+                *([doc.listed(line.requirement.requirement_ids) or "–"] if has_ids else []),
+                tuple(name),
                 dashed(line.allowed),
                 dashed(line.reached),
                 (dashed(line.use), doc.Use(None if line.use == "-" else line.requirement.utilization, line.status)),
                 doc.Badge(line.status),
+                verification_words(page.findings, line.requirement),
                 (decided, ", " if line.decided_by and line.remark else "", line.remark),
             )
         )
-    columns = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
+    ids = [doc.Head("Id", "id")] if has_ids else []
+    sizes = doc.numbers("Limit", "Reached", "Use")
+    columns = doc.heads(*ids, "Requirement", *sizes, "Status", "Verification", "Decided by")
     caption = "Requirements and their verdicts"
     return doc.TextTable(f"Requirements of {page.name}", caption, columns, lines, "requirements")
 
 
-def _required(line: RequirementLine) -> doc.Text:
-    """Name of a requirement, with its requirement ids in the project and their texts."""
-    requirement = line.requirement
-    name = sentence(line.name) + (" (default)" if requirement.is_default else "")
-    ids = [requirement.requirement_id] if requirement.requirement_id else []
-    texts = [doc.Styled("own-id", doc.Name(text)) for text in (*ids, *line.texts)]
-    return (name, *texts) if texts else name
+def _declarations(page: Page) -> Iterator[doc.Block]:
+    """Yield the table that says which errors each platform declares, and from which source."""
+    declarations = declared_by_owner(page.findings)
+    if not declarations:
+        return
+    lines = [(declaration.owner, ", ".join(declaration.kinds), _source(declaration)) for declaration in declarations]
+    columns = doc.heads("Platform", "Declared errors", "Source")
+    caption = "Declared errors and their sources"
+    yield doc.TextTable(f"Sources of {page.name}", caption, columns, lines, "sources")
+
+
+def _source(declaration: Declaration) -> doc.Text:
+    if declaration.source is not None:
+        return declaration.source
+    return doc.Styled("missing", "no source stated") if declaration.owes_source else "the mission file"
 
 
 def _drivers(page: Page) -> Iterator[Row]:
@@ -385,8 +407,12 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
         yield reasons
 
 
+def _geometry_facts(page: Page) -> doc.Facts:
+    return doc.Facts([(name, sentence(text)) for name, text in head(page.findings)], "facts wide")
+
+
 def _geometry(page: Page) -> Iterator[doc.Block]:
-    yield doc.Facts([(name, sentence(text)) for name, text in head(page.findings)], "facts wide")
+    yield _geometry_facts(page)
     figures = []
     for name, title, svg in (
         ("plan", "Plan: the collection from above", geometry_plan(page.findings)),
@@ -478,17 +504,6 @@ def _validity(page: Page) -> Iterator[doc.Block]:
         for name, value, origin in _inputs(page)
     ]
     yield doc.Facts(inputs, "inputs")
-    by_source, unsourced = sources(findings)
-    source_words = "; ".join(f"“{text}” for {counted(len(rows), 'row')}" for text, rows in by_source.items())
-    texts = [f"Sources: {source_words}."] if source_words else []
-    if unsourced:
-        texts.append(f"The file names no source for {counted(len(unsourced), 'declared row')}.")
-    if texts:
-        yield doc.Paragraph(" ".join(texts))
-
-
-# Files of a path besides the file of its positions.
-_PATH_FILE_NAMES = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s orientation"}
 
 
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
@@ -506,11 +521,6 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         )
     for name, path in findings.paths:
         yield f"Path of the {name}", path_words(path)
-        if path.sha256 is not None:
-            yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
-        for use, file in path.beside.items():
-            if file is not None:
-                yield f"{_PATH_FILE_NAMES[use]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
     yield "Combination", _COMBINATION_SENTENCES[findings.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT_MPS / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = (

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import cache
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
@@ -18,6 +18,7 @@ from bisar_budget.resources import resource
 _BREAK_POINT = re.compile(
     r"([._/])(?=\w{2})"
 )  # where a long name may break; one-letter axes stay with the name before
+_LONG_WORD = re.compile(r"[^\s._/-]{30}(?=[^\s._/-])")  # may break after it, where no line is as wide
 _BAR_ATTRIBUTES = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
 _USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # a utilization of 100 % is at 96
 _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
@@ -63,8 +64,10 @@ def _text(text: doc.Text) -> Markup:
         case tuple():
             return Markup("").join(map(_text, text))
         case doc.Name(words, target):
-            broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(escape(printable(words)))))
+            broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(_plain(words))))
             return Markup('<a href="#{}">{}</a>').format(target, broken) if target else broken
+        case doc.Styled("digest", str(digest)):  # without places to break, so that a search finds it
+            return Markup('<span class="digest">{}</span>').format(printable(digest))
         case doc.Styled(style, inner):
             return Markup('<span class="{}">{}</span>').format(style, _text(inner))
         case doc.Badge(status):
@@ -82,7 +85,14 @@ def _text(text: doc.Text) -> Markup:
             return Markup(f'<span class="swatch {owner}" aria-hidden="true"></span>')
         case doc.Code(words):
             return Markup("<code>{}</code>").format(printable(words))
-    return escape(printable(text))
+    return _plain(text)
+
+
+def _plain(text: str) -> Markup:
+    """Write text, in which a long word without a place to break gets some."""
+    shown_text = printable(text)
+    pieces = _LONG_WORD.sub("\\g<0>\n", shown_text).split("\n") if len(shown_text) > 30 else [shown_text]
+    return Markup("<wbr>").join(pieces)
 
 
 def _fill(width: float) -> str:

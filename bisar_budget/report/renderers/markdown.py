@@ -11,7 +11,7 @@ from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.report.words.sentences import markdown_row, markdown_text, uri
 
 _BAR_WIDTH, _LIMIT_WIDTH = 20, 16  # characters of a whole bar, and of a utilization of 100 %
-_BRACKETED = {"own-id": " ({})", "origin": "({})"}
+_BRACKETED = {"own-id": " ({})", "origin": "({})", "own-text": ": {}"}
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 

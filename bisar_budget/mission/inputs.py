@@ -1,0 +1,62 @@
+"""Files that a mission reads, with their SHA-256."""
+
+import os
+from collections.abc import Iterator
+from hashlib import sha256
+from typing import NamedTuple
+
+from bisar_budget.mission.load import folder_of
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.parts import is_file
+from bisar_budget.mission.paths import reader_of
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.resources import resource
+
+
+class InputFile(NamedTuple):
+    """A file that a mission reads.
+
+    `use` is what the mission takes from it, and `name` the name by which the mission refers to it. `path` is its
+    path on the disk; empty for a part of the catalogue of this package. `digest` is its SHA-256.
+    """
+
+    use: str
+    name: str
+    path: str
+    digest: str
+
+
+_USES_BESIDE = {"accuracy": "accuracy of the path of the {}", "earth_orientation": "orientation of the Earth"}
+
+
+def input_files(mission: Mission) -> list[InputFile]:
+    """List the files that a mission reads: the mission file, requirements, logs, orbits, their companions, parts."""
+    return list(dict.fromkeys(_input_files(mission)))
+
+
+def _input_files(mission: Mission) -> Iterator[InputFile]:
+    folder = folder_of(mission.file)
+    yield InputFile("mission", mission.file, mission.file, sha256(mission.data).hexdigest())
+    if name := getattr(mission.requirements, "file", None):
+        try:
+            digest = sha256(reader_of(folder)(name)).hexdigest()
+        except PathFileError:  # it was removed after the mission was read
+            digest = ""
+        yield InputFile("requirements", name, os.path.join(folder, name), digest)
+    for owner, platform in mission.platforms._asdict().items():
+        if platform.path is None:
+            continue
+        if platform.path.file is not None and platform.path.sha256 is not None:
+            name, digest = platform.path.file, platform.path.sha256
+            yield InputFile(f"path of the {owner}", name, os.path.join(folder, name), digest)
+        for use, file in platform.path.beside.items():
+            if file is not None:
+                words = _USES_BESIDE[use].format(owner)
+                yield InputFile(words, file[0], os.path.join(folder, file[0]), file[1])
+    catalogue = os.path.join(str(resource("specs", "sensors")), "")
+    for part in mission.parts:
+        is_of_catalogue = not is_file(part.name) and part.file.startswith(catalogue)
+        path = "" if is_of_catalogue else part.file
+        name = part.name if is_file(part.name) else os.path.basename(part.file)
+        use = "part of the catalogue" if is_of_catalogue else "part"
+        yield InputFile(use, name, path, sha256(part.data).hexdigest())

@@ -1,0 +1,64 @@
+"""Chapter about the document of a mission: change record, git repository, and all files that the mission read."""
+
+from collections.abc import Iterator
+
+from bisar_budget.mission.inputs import InputFile, input_files
+from bisar_budget.mission.model import Document
+from bisar_budget.mission.work_tree import WorkTree
+from bisar_budget.report import document as doc
+from bisar_budget.report.compliance.rows import Page
+from bisar_budget.report.words.heading import document_words
+from bisar_budget.report.words.sentences import counted
+
+_LISTED_FILE_COUNT = 3  # inputs that a fact names
+
+
+def document_facts(document: Document, work_tree: WorkTree | None) -> Iterator[tuple[doc.Text, doc.Text]]:
+    """Yield the facts that identify a document: number, issue, author, applicable documents, and commit."""
+    if words := document_words(document):
+        yield "Document", words + (f"; author {document.author}" if document.author else "")
+    elif document.author:
+        yield "Author", document.author
+    if document.applicable:
+        yield "Applicable", "; ".join(document.applicable)
+    if work_tree is not None:
+        yield "Repository", commit_words(work_tree)
+
+
+def commit_words(work_tree: WorkTree) -> doc.Text:
+    """Text with the commit of a git repository, and whether its files are as committed."""
+    if not work_tree.commit:
+        return work_tree.reason
+    clauses = []
+    if work_tree.changed:
+        clauses.append(f"not clean, {counted(len(work_tree.changed), 'file')} changed since")
+    if work_tree.changed_inputs:
+        clauses.append(f"changed inputs: {_named(work_tree.changed_inputs)}")
+    if work_tree.new_inputs:
+        clauses.append(f"inputs never committed: {_named(work_tree.new_inputs)}")
+    state = "; ".join(clauses) or "clean"
+    return "commit ", doc.Styled("digest", work_tree.commit), f", {state}"
+
+
+def _named(files: tuple[str, ...]) -> str:
+    """Names of a few files, and the number of the others."""
+    others = len(files) - _LISTED_FILE_COUNT
+    return ", ".join(files[:_LISTED_FILE_COUNT]) + (f" and {others} more" if others > 0 else "")
+
+
+def record(page: Page) -> doc.Chapter:
+    """Return the chapter with the change record of the document, and all inputs with their SHA-256."""
+    blocks: list[doc.Block] = []
+    if changes := page.mission.document.changes:
+        lines: list[doc.Line] = [(change.issue, change.date.isoformat(), change.what) for change in changes]
+        columns = doc.heads("Issue", "Date", "Change")
+        blocks.append(doc.TextTable("", "Change record", columns, lines, "changes"))
+    columns = doc.heads("Input", "File", "SHA-256")
+    lines = [_input_line(page, file) for file in input_files(page.mission)]
+    blocks.append(doc.TextTable(f"Inputs of {page.name}", "Files that were read", columns, lines, "files"))
+    return doc.Chapter("Document and inputs", blocks, f"{page.anchor}-record")
+
+
+def _input_line(page: Page, file: InputFile) -> doc.Line:
+    shown_name = page.file if file.use == "mission" else file.name.replace("\\", "/")
+    return file.use, doc.Styled("id", doc.Name(shown_name)), doc.Styled("digest", file.digest or "not read")
