@@ -199,7 +199,7 @@ class ErrorSource(NamedTuple):
     @property
     def is_motion(self) -> bool:
         """Whether the error moves platforms or shifts the clock. It is false for a pure phase error."""
-        return self.unit != "rad"
+        return self.kind.moves != "image"
 
     @property
     def is_time_tag(self) -> bool:

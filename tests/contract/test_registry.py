@@ -80,6 +80,23 @@ def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
     assert row.displacement_m == (0.0, 0.0)
 
 
+@pytest.mark.parametrize("dimension", [units.ANGLE, units.RATIO, units.SPEED], ids=lambda dimension: dimension.si)
+def test_a_motion_has_a_size_of_any_dimension(dimension: units.Dimension) -> None:
+    """An error in rad was taken for a pure phase error, and no check of it ended."""
+
+    def north(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, 0 * times + 1, 0 * times])
+
+    bb.register(bb.MotionKind(name="tilt", dimension=dimension, description="Tilt.", motion=north))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    size = f"1 {dimension.si}" if dimension.si not in ("", "1") else 1.0
+    tilted = mission.replace({"platforms.receiver.motion_error.registered.tilt": size})
+    shifted = mission.replace({"platforms.receiver.motion_error.position": ["0 m", "1 m", "0 m"]})
+    row, position = bb.check(tilted)["receiver.tilt"], bb.check(shifted)["receiver.position.y"]
+    assert row.displacement_m == pytest.approx(position.displacement_m, rel=1e-4)
+    assert row.utilization == pytest.approx(position.utilization, rel=1e-4)
+
+
 def test_both_platforms_may_have_it_and_its_sign_counts() -> None:
     """The same rigid shift of both platforms as a registered kind and as `common_motion_error`."""
 
