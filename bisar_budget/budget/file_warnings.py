@@ -29,6 +29,7 @@ from bisar_budget.ranges.resolution import Resolution
 
 _SENSITIVITY = "acceleration_sensitivity"
 
+_MAX_GROUND_HEIGHT_M = 20e3  # of a scene, above a sphere of the Earth's mean radius
 _MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that are not geostationary
 
 
@@ -60,7 +61,7 @@ def file_warnings(
         *_of_the_whole(mission, rows),
         *(_Warned(*warning) for warning in waivers),
         *_unused_correlations(mission),
-        *straight_orbits(mission),
+        *paths_in_doubt(mission),
         *_doubtful_paths(mission),
         *_noisy_fits(mission),
         *_of_instruments(case),
@@ -126,29 +127,43 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
             yield _Warned(("platforms", name, "trajectory"), note)
 
 
-def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of platforms that move like a satellite but have no `acceleration`.
+def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
+    """Yield warnings of platforms that move like a satellite, but not in free fall.
 
-    The warning gives the acceleration to add. A platform moves like a satellite if it is as fast or as high as one.
-    Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
-    example 25 m in 5 s. There is no warning if the file states an acceleration, including zero.
+    The warning gives the acceleration of free fall. A platform moves like a satellite if it is as fast or as high as
+    one. Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8,
+    for example 25 m in 5 s. Errors of a platform that does not fall are judged without the dynamics of an orbit,
+    which matter in long apertures. Below 100 km there is no warning if the file states an acceleration, even zero.
     """
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
-        if platform.acceleration is not None or platform.is_of_the_earth:
-            continue
         state, axes = platform.state, mission.scene.axes
-        speed = float(norm(state.velocity))
-        is_in_space = speed > _MIN_ORBIT_SPEED_MPS and state.position[2] > LEAST_FALLING_HEIGHT_M
-        if not (speed > MAX_FLIGHT_SPEED_MPS or (is_in_space and state.fall is None)):
+        if state.fall is not None:
             continue
-        key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
-        from bisar_budget.paths.earth import free_fall  # the import takes 8 ms and most missions do not need it
+        speed = float(norm(state.velocity))
+        has_no_bend = platform.acceleration is None and not platform.is_of_the_earth
+        is_fast = has_no_bend and speed > MAX_FLIGHT_SPEED_MPS
+        if not is_fast and state.slant_range < LEAST_FALLING_HEIGHT_M - _MAX_GROUND_HEIGHT_M:
+            continue
+        from bisar_budget.paths.earth import free_fall  # these imports take 8 ms; most missions do not need them
+        from bisar_budget.paths.free_fall import departure_of
 
+        height, departure = map(float, departure_of(state, axes))
+        is_high = height > LEAST_FALLING_HEIGHT_M
+        if not (is_fast or is_high):
+            continue
         acceleration = free_fall(plain_vector(state.position), plain_vector(state.velocity), axes)
-        yield _Warned(
-            key, phrases.satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True
+        key, sentence = (
+            "speed" if platform.velocity is None else "velocity",
+            phrases.satellite_does_not_fall(name, height, departure, acceleration, axes is not None),
         )
+        if is_fast or (has_no_bend and speed > _MIN_ORBIT_SPEED_MPS):
+            sentence = phrases.satellite_flies_straight(name, speed, acceleration, axes is not None)
+        elif platform.acceleration is not None:
+            key = "acceleration"
+        elif platform.is_of_the_earth:
+            key = platform.way
+        yield _Warned(("platforms", name, key), sentence, is_doubt=True)
 
 
 # ---------------------------------------------------------------------- how errors are stated

@@ -150,19 +150,25 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
     A path is in free fall if its acceleration differs from that of free fall by at most 5 % of gravity, μ/r². The
     coordinates of the path may be arrays (cases,). Then `share` of the result says which cases are in free fall.
     """
-    fall = of_scene(axes)
-    x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
-    distance = norm((x, y, z))
-    is_high = distance - EARTH_RADIUS_M > LEAST_FALLING_HEIGHT_M
-    if not np.any(is_high):
-        return None
-    falling = free_fall(path.position, path.velocity, axes)
-    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
-    apart = norm((u, v, w))
-    falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**2)
+    height, departure = departure_of(path, axes)
+    falls = (height > LEAST_FALLING_HEIGHT_M) & (departure <= FREE_FALL_FRACTION)
     if not np.any(falls):
         return None
+    fall = of_scene(axes)
     return fall if np.all(falls) else FreeFall(fall.centre, fall.rotation, np.asarray(falls, dtype=float))
+
+
+def departure_of(path: PlatformState, axes: SceneAxes | None) -> tuple[PerCase, PerCase]:
+    """Height of a path above a spherical Earth [m], and departure of its acceleration from that of free fall.
+
+    The departure is a fraction of gravity, μ/r². Both are numbers, or arrays (cases,).
+    """
+    centre = of_scene(axes).centre
+    x, y, z = (component - origin for component, origin in zip(path.position, centre, strict=True))
+    distance = norm((x, y, z))
+    falling = free_fall(path.position, path.velocity, axes)
+    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
+    return distance - EARTH_RADIUS_M, norm((u, v, w)) * distance**2 / EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 
 
 @dataclass(frozen=True, eq=False)

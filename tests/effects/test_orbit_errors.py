@@ -258,10 +258,39 @@ def test_a_deleted_acceleration_is_no_silent_pass() -> None:
 
 
 @pytest.mark.parametrize(
-    ("speed", "height", "warns"), [(101.0, 101e3, True), (99.0, 101e3, False), (101.0, 99e3, False)]
+    ("speed", "height", "words"),
+    [
+        (101.0, 101e3, "but the path is straight"),
+        (99.0, 101e3, "differs from that of free fall"),
+        (1.0, 400e3, "differs from that of free fall"),
+        (101.0, 91e3, None),
+    ],
 )
-def test_a_straight_path_is_a_satellites_above_100_km_and_100_m_per_s(
-    speed: float, height: float, warns: bool
-) -> None:
+def test_a_straight_path_above_100_km_is_a_doubt(speed: float, height: float, words: str | None) -> None:
+    """The height is that above a sphere; 300 km away it is 4 km more than above the plane of the scene."""
     found = without_acceleration(position=[0.0, -300e3, height], velocity=[speed, 0.0, 0.0])
-    assert any("but the path is straight" in str(warning) for warning in found.warnings) == warns
+    if words is None:
+        assert found.warnings == ()
+    else:
+        (warning,) = found.warnings
+        assert words in str(warning)
+        assert warning.is_doubt
+
+
+@pytest.mark.parametrize("is_placed", [True, False])
+def test_a_geosynchronous_mission_just_outside_free_fall_is_no_silent_pass(is_placed: bool) -> None:
+    """4 m of radial error fail with the acceleration of free fall. 5.1 % beside it, or without a latitude, they are
+    judged without the dynamics of the orbit, and passed in silence."""
+    document = CASES[0].document(position=["4 m", "0 m", "0 m"])
+    platform = document["platforms"]["transmitter"]
+    assert check_mission(parse_mission(yaml_text(document)), date(2026, 1, 1)).status == "fail"
+    if is_placed:
+        platform["acceleration"] = [platform["acceleration"][0] + 0.051 * MU / GEO**2, *platform["acceleration"][1:]]
+    else:
+        document["scene"] = {}
+        platform["motion_error"]["frame"] = "look"
+    found = check_mission(parse_mission(yaml_text(document)), date(2026, 1, 1))
+    assert found.status == "warn"
+    (text,) = [str(warning) for warning in found.warnings if "differs from that of free fall" in str(warning)]
+    assert ("by 5.1 % of gravity" in text) == is_placed
+    assert ("add scene.latitude" in text) == (not is_placed)
