@@ -5,6 +5,7 @@ Most warnings do not change the verdict. A warning that casts doubt on the check
 the file.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -15,8 +16,14 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.constants import LEAST_FALLING_HEIGHT_M, MAX_FLIGHT_SPEED_MPS
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.budget.judged_requirements import negligible_rad
+from bisar_budget.constants import (
+    EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2,
+    EARTH_RADIUS_M,
+    LEAST_FALLING_HEIGHT_M,
+    MAX_FLIGHT_SPEED_MPS,
+)
+from bisar_budget.effects.effect import NOWHERE, PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
@@ -130,40 +137,63 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
     """Yield warnings of platforms that move like a satellite, but not in free fall.
 
-    The warning gives the acceleration of free fall. A platform moves like a satellite if it is as fast or as high as
-    one. Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8,
-    for example 25 m in 5 s. Errors of a platform that does not fall are judged without the dynamics of an orbit,
-    which matter in long apertures. Below 100 km there is no warning if the file states an acceleration, even zero.
+    The warning gives the acceleration of free fall. A path without an acceleration is that of a satellite if it is as
+    fast as one, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a moves the true
+    path away from the straight path by aT²/8, for example 25 m in 5 s. Errors of any other path above 100 km that is
+    not in free fall are judged without the dynamics of an orbit. This gives a warning if these dynamics may change a
+    phase noticeably.
     """
+    noticeable = float(negligible_rad(mission))
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         state, axes = platform.state, mission.scene.axes
         if state.fall is not None:
             continue
         speed = float(norm(state.velocity))
-        has_no_bend = platform.acceleration is None and not platform.is_of_the_earth
-        is_fast = has_no_bend and speed > MAX_FLIGHT_SPEED_MPS
+        is_unbent = platform.acceleration is None and not platform.is_of_the_earth
+        is_fast = is_unbent and speed > MAX_FLIGHT_SPEED_MPS
         if not is_fast and state.slant_range < LEAST_FALLING_HEIGHT_M - _MAX_GROUND_HEIGHT_M:
             continue
         from bisar_budget.paths.earth import free_fall  # these imports take 8 ms; most missions do not need them
         from bisar_budget.paths.free_fall import departure_of
 
-        height, departure = map(float, departure_of(state, axes))
-        is_high = height > LEAST_FALLING_HEIGHT_M
-        if not (is_fast or is_high):
+        height, departure = (float(number) for number in departure_of(state, axes))
+        if not is_fast and height <= LEAST_FALLING_HEIGHT_M:
             continue
         acceleration = free_fall(plain_vector(state.position), plain_vector(state.velocity), axes)
-        key, sentence = (
-            "speed" if platform.velocity is None else "velocity",
-            phrases.satellite_does_not_fall(name, height, departure, acceleration, axes is not None),
-        )
-        if is_fast or (has_no_bend and speed > _MIN_ORBIT_SPEED_MPS):
+        key: str = "speed" if platform.velocity is None else "velocity"
+        if is_fast or (is_unbent and speed > _MIN_ORBIT_SPEED_MPS):
             sentence = phrases.satellite_flies_straight(name, speed, acceleration, axes is not None)
-        elif platform.acceleration is not None:
-            key = "acceleration"
-        elif platform.is_of_the_earth:
-            key = platform.way
+        elif (phase := _missing_phase(mission, platform, EARTH_RADIUS_M + height)) > noticeable:
+            sentence = phrases.satellite_does_not_fall(name, height, departure, phase, acceleration, axes is not None)
+            if not is_unbent:
+                key = platform.way if platform.is_of_the_earth else "acceleration"
+        else:
+            continue
         yield _Warned(("platforms", name, key), sentence, is_doubt=True)
+
+
+def _missing_phase(mission: Mission, platform: Platform, distance: float) -> float:
+    """Largest quadratic phase that the dynamics of an orbit may add to declared errors of a platform. [rad]
+
+    `distance` is the platform's distance from the Earth's centre. [m]
+
+    Derived here. Relative to p + vτ, the gradient of gravity and the rotation of the Earth accelerate an error by at
+    most (2μ/r³ + ω²)|δr| + 2ω|δv|. A constant acceleration a over an aperture time T has the phase 2π/λ·aT²/8.
+    """
+    from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
+
+    error, common = platform.motion_error, mission.common_motion_error
+    position, velocity = (
+        math.hypot(*(of_platform or NOWHERE)) + math.hypot(*(of_both or NOWHERE))
+        for of_platform, of_both in (
+            (error.stated("position"), common and common.position),
+            (error.stated("velocity"), common and common.velocity),
+        )
+    )
+    gradient = 2 * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 + ROTATION_RATE_RAD_PER_S**2
+    pushed = mission.allocation.coverage_factor * (gradient * position + 2 * ROTATION_RATE_RAD_PER_S * velocity)
+    return float(2 * math.pi / mission.radar.wavelength * pushed * mission.collection.aperture_time**2 / 8)
 
 
 # ---------------------------------------------------------------------- how errors are stated

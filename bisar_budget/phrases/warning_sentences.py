@@ -79,18 +79,19 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
 
 @composed
 def satellite_does_not_fall(
-    platform: str, height: float, departure: float, acceleration: Sequence[float], has_axes: bool
+    platform: str, height: float, departure: float, phase: float, acceleration: Sequence[float], has_axes: bool
 ) -> str:
     """Sentence for a path that is as high as a satellite's, but not in free fall.
 
     `height` is in m. `departure` is the difference from the acceleration of free fall, as a fraction of gravity.
+    `phase` is the quadratic phase that the dynamics of an orbit may add to the declared errors. [rad]
     `acceleration` has the components of the acceleration of free fall. [m/s²]
     """
     missing = "" if has_axes else " If the acceleration is Earth-fixed, add scene.latitude, longitude and height."
     return (
         f"platforms.{platform}: a path {height / 1e3:.0f} km high is a satellite's, but its acceleration differs "
         f"from that of free fall by {100 * departure:.3g} % of gravity, and 5 % is accepted. Its errors are judged "
-        f"without the dynamics of an orbit, which may make them look far too small.{missing} Free fall has "
+        f"without the dynamics of an orbit, which may add a QPE of up to {phase:.2g} rad.{missing} Free fall has "
         f"{_of_free_fall(acceleration, has_axes)}"
     )
 
