@@ -165,7 +165,7 @@ class StateKind(SourceKind):
 Motion = Callable[["PlatformState", "Floats"], "Floats"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, init=False)
 class MotionKind(SourceKind):
     """A kind of error that is described completely by the motion error of the antenna's phase centre.
 
@@ -195,16 +195,21 @@ class MotionKind(SourceKind):
         The name does not begin with a lower-case letter, or has characters other than those, digits and underscores.
     """
 
-    moves: str = "platform"
     dimension: units.Dimension
     description: str
     motion: Motion
-    equation: str = "full model"
+    equation: str
 
-    def __post_init__(self) -> None:
-        """Check that the name has the accepted form."""
-        if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
-            raise ValueError(f"{self.name!r} is no name of a kind; accepted: small letters, digits, underscores")
+    def __init__(
+        self, *, name: str, dimension: units.Dimension, description: str, motion: Motion, equation: str = "full model"
+    ) -> None:
+        """Make a kind of error of a platform. All other attributes of `SourceKind` follow from the motion."""
+        if not re.fullmatch("[a-z][a-z0-9_]*", name):
+            raise ValueError(f"{name!r} is no name of a kind; accepted: small letters, digits, underscores")
+        super().__init__(name=name, moves="platform")
+        attributes = {"dimension": dimension, "description": description, "motion": motion, "equation": equation}
+        for attribute, value in attributes.items():
+            object.__setattr__(self, attribute, value)
 
     @property
     def unit(self) -> str:
@@ -274,14 +279,22 @@ def _words_of(error: BaseException) -> str:
     return printable(f"{type(error).__name__}: {error}"[:_MAX_CHARACTERS])
 
 
-def register(kind: ErrorKind) -> None:
+def register(kind: MotionKind) -> None:
     """Add a kind of error to those that every command knows.
 
     Raises
     ------
+    TypeError
+        The object is no `MotionKind`. Only a motion says everything about a kind.
     ValueError
         Another kind with the same name is registered.
     """
+    if not isinstance(kind, MotionKind):
+        raise TypeError(f"{kind!r} is no bisar_budget.MotionKind")
+    _add(kind)
+
+
+def _add(kind: ErrorKind) -> None:
     if _KINDS.setdefault(kind.name, kind) is not kind:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
@@ -355,7 +368,7 @@ for _kind in (
     SumKind(name="declare"),
     SumKind(name="specification", id_form="{kind}.{axis}"),
 ):
-    register(_kind)
+    _add(_kind)
 
 
 @cache

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from click.testing import CliRunner, Result
 import bisar_budget as bb
 from bisar_budget import error_kinds, units
 from bisar_budget.cli import cli
-from bisar_budget.error_kinds import kind_of, kinds
+from bisar_budget.error_kinds import SourceKind, kind_of, kinds
 from bisar_budget.faults import MotionKindError
 from bisar_budget.mission.changes import all_keys
 from tests.conftest import APART, ROOT
@@ -75,6 +76,22 @@ def test_a_kind_has_one_name() -> None:
 def test_a_name_fits_into_a_row_id(name: str) -> None:
     with pytest.raises(ValueError, match="is no name of a kind"):
         kind(name)
+
+
+OTHER_FACTS = sorted({each.name for each in fields(SourceKind)} - {"name"})
+
+
+@pytest.mark.parametrize("fact", OTHER_FACTS)
+def test_the_motion_says_everything_about_a_registered_kind(fact: str) -> None:
+    """A kind with other facts than those of a motion was accepted, and judged, flown or drawn as something else."""
+    with pytest.raises(TypeError, match=fact):
+        bb.MotionKind(name="untrue", dimension=units.LENGTH, description="Error.", motion=still, **{fact: "time_tag"})
+
+
+def test_nothing_but_a_motion_is_registered() -> None:
+    """A kind without a motion was accepted, and no command knew it."""
+    with pytest.raises(TypeError, match="MotionKind"):
+        bb.register(SourceKind(name="leak", moves="air"))
 
 
 def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
