@@ -141,7 +141,7 @@ def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
     fast as one, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a moves the true
     path away from the straight path by aT²/8, for example 25 m in 5 s. Errors of any other path above 100 km that is
     not in free fall are judged without the dynamics of an orbit. This gives a warning if these dynamics may change a
-    phase noticeably.
+    phase noticeably, or if errors are stated in `ric`, because their velocities then are not against the stars.
     """
     noticeable = float(negligible_rad(mission))
     for name in PLATFORMS:
@@ -164,13 +164,22 @@ def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
         key: str = "speed" if platform.velocity is None else "velocity"
         if is_fast or (is_unbent and speed > _MIN_ORBIT_SPEED_MPS):
             sentence = phrases.satellite_flies_straight(name, speed, acceleration, axes is not None)
-        elif (phase := _missing_phase(mission, platform, EARTH_RADIUS_M + height)) > noticeable:
+        elif (phase := _missing_phase(mission, platform, EARTH_RADIUS_M + height)) > noticeable or _is_along_orbit(
+            mission, platform
+        ):
             sentence = phrases.satellite_does_not_fall(name, height, departure, phase, acceleration, axes is not None)
             if not is_unbent:
                 key = platform.way if platform.is_of_the_earth else "acceleration"
         else:
             continue
         yield _Warned(("platforms", name, key), sentence, is_doubt=True)
+
+
+def _is_along_orbit(mission: Mission, platform: Platform) -> bool:
+    """Whether the file states errors of a platform in `ric`; only in orbits their velocities are against the stars."""
+    error, common = platform.motion_error, mission.common_motion_error
+    is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
+    return is_of_platform or (common is not None and common.frame == "ric")
 
 
 def _missing_phase(mission: Mission, platform: Platform, distance: float) -> float:

@@ -91,7 +91,8 @@ def satellite_does_not_fall(
     return (
         f"platforms.{platform}: a path {height / 1e3:.0f} km high is a satellite's, but its acceleration differs "
         f"from that of free fall by {100 * departure:.3g} % of gravity, and 5 % is accepted. Its errors are judged "
-        f"without the dynamics of an orbit, which may add a QPE of up to {phase:.2g} rad.{missing} Free fall has "
+        f"without the dynamics of an orbit, which may add a QPE of up to {phase:.2g} rad, and "
+        f"velocity errors in ric are rates of Earth-fixed vectors.{missing} Free fall has "
         f"{_of_free_fall(acceleration, has_axes)}"
     )
 

@@ -6,7 +6,7 @@ and the rows that are judged.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from functools import cache
 from typing import Any
@@ -329,3 +329,16 @@ def test_a_geosynchronous_mission_just_outside_free_fall_is_no_silent_pass(is_pl
     (text,) = [str(warning) for warning in found.warnings if "differs from that of free fall" in str(warning)]
     assert ("by 5.1 % of gravity" in text) == is_placed
     assert ("add scene.latitude" in text) == (not is_placed)
+
+
+@pytest.mark.parametrize(("frame", "count"), [("ric", 1), ("look", 0)])
+def test_ric_of_a_high_path_that_does_not_fall_is_a_doubt(frame: str, count: int) -> None:
+    """In free fall its velocities are against the stars: in geosynchronous orbit, 1 m moves the image by 110 m. In
+    another path they are Earth-fixed, and it is 0.07 m. The phase is negligible in either case."""
+    document = replace(CASES[0], frame=frame, aperture_time=4).document(position=["0 m", "1 m", "0 m"])
+    acceleration = document["platforms"]["transmitter"]["acceleration"]
+    acceleration[0] += 0.051 * MU / GEO**2
+    found = check_mission(parse_mission(yaml_text(document)), date(2026, 1, 1))
+    texts = [str(warning) for warning in found.warnings if "differs from that of free fall" in str(warning)]
+    assert len(texts) == count
+    assert all("velocity errors in ric are rates of Earth-fixed vectors" in text for text in texts)
