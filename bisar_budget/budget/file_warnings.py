@@ -176,7 +176,7 @@ def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
 
 
 def _is_along_orbit(mission: Mission, platform: Platform) -> bool:
-    """Whether the file states errors of a platform in `ric`; only in orbits their velocities are against the stars."""
+    """Whether the file states errors of a platform in `ric`, whose velocities are inertial only in orbits."""
     error, common = platform.motion_error, mission.common_motion_error
     is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
     return is_of_platform or (common is not None and common.frame == "ric")
