@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 _Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
 _MAX_CHARACTERS = 300  # of the message of an exception of another package
+# Words of row ids, and of groups of rows, that are no kinds: owners, sections and axes.
+_OWNERS = ("transmitter", "receiver", "mission", "clock", "common", "scene")
+_AXES = ("x", "y", "z", "along", "cross", "up", "line_of_sight", "radial", "in_track", "cross_track")
+_TAKEN_NAMES = frozenset((*_OWNERS, *_AXES, "covariance"))
 _OWNER_WORDS = {"clock": "timing"}  # owners that have another name in row ids
 
 
@@ -192,7 +196,8 @@ class MotionKind(SourceKind):
     Raises
     ------
     ValueError
-        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores.
+        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores,
+        or it is a word that has another meaning in row ids, such as `receiver` or `covariance`.
     """
 
     dimension: units.Dimension
@@ -206,6 +211,8 @@ class MotionKind(SourceKind):
         """Make a kind of error of a platform. All other attributes of `SourceKind` follow from the motion."""
         if not re.fullmatch("[a-z][a-z0-9_]*", name):
             raise ValueError(f"{name!r} is no name of a kind; accepted: small letters, digits, underscores")
+        if name in _TAKEN_NAMES:
+            raise ValueError(f"{name!r} is no name of a kind: it has another meaning in the ids of rows")
         super().__init__(name=name, moves="platform")
         attributes = {"dimension": dimension, "description": description, "motion": motion, "equation": equation}
         for attribute, value in attributes.items():

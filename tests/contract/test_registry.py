@@ -13,8 +13,10 @@ from click.testing import CliRunner, Result
 import bisar_budget as bb
 from bisar_budget import error_kinds, units
 from bisar_budget.cli import cli
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.error_kinds import SourceKind, kind_of, kinds
 from bisar_budget.faults import MotionKindError
+from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import all_keys
 from tests.conftest import APART, ROOT
 
@@ -75,6 +77,23 @@ def test_a_kind_has_one_name() -> None:
 @pytest.mark.parametrize("name", ["", "Drift", "phase centre", "2nd", "a.b"])
 def test_a_name_fits_into_a_row_id(name: str) -> None:
     with pytest.raises(ValueError, match="is no name of a kind"):
+        kind(name)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *PLATFORMS,
+        "mission",
+        "clock",
+        "common",
+        "covariance",
+        *{axis for axes in FRAME_AXES.values() for axis in axes},
+    ],
+)
+def test_a_name_with_another_meaning_is_refused(name: str) -> None:
+    """`receiver.covariance` is the group of the errors of a covariance, beside which a kind had the same id."""
+    with pytest.raises(ValueError, match="another meaning in the ids of rows"):
         kind(name)
 
 
@@ -209,6 +228,7 @@ UNUSABLE = [
     (writing, "raises ValueError"),
     (without_numbers, "not finite"),
     (lambda path, times: [times, 0], "raises ValueError"),
+    (lambda path, times: np.stack([times, times, times]) * 1j, "type complex128; accepted: real numbers"),
     (lambda path, times: np.ones((3, *times.shape), dtype=str), "type"),
 ]
 
