@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.faults import MotionKindError, printable
 
 if TYPE_CHECKING:
     from bisar_budget.arrays import Floats
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
 
 _Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
+_MAX_CHARACTERS = 300  # of the message of an exception of another package
+# Words of row ids, and of groups of rows, that are no kinds: owners, sections and axes.
+_OWNERS = ("transmitter", "receiver", "mission", "clock", "common", "scene")
+_AXES = ("x", "y", "z", "along", "cross", "up", "line_of_sight", "radial", "in_track", "cross_track")
+_TAKEN_NAMES = frozenset((*_OWNERS, *_AXES, "covariance"))
 _OWNER_WORDS = {"clock": "timing"}  # owners that have another name in row ids
 
 
@@ -160,14 +166,10 @@ class StateKind(SourceKind):
         return self.order < 2
 
 
-class MotionKindError(ValueError):
-    """A registered kind of error gives a motion that cannot be used; the message names the kind."""
-
-
 Motion = Callable[["PlatformState", "Floats"], "Floats"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, init=False)
 class MotionKind(SourceKind):
     """A kind of error that is described completely by the motion error of the antenna's phase centre.
 
@@ -194,19 +196,27 @@ class MotionKind(SourceKind):
     Raises
     ------
     ValueError
-        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores.
+        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores,
+        or it is a word that has another meaning in row ids, such as `receiver` or `covariance`.
     """
 
-    moves: str = "platform"
     dimension: units.Dimension
     description: str
     motion: Motion
-    equation: str = "full model"
+    equation: str
 
-    def __post_init__(self) -> None:
-        """Check that the name has the accepted form."""
-        if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
-            raise ValueError(f"{self.name!r} is no name of a kind; accepted: small letters, digits, underscores")
+    def __init__(
+        self, *, name: str, dimension: units.Dimension, description: str, motion: Motion, equation: str = "full model"
+    ) -> None:
+        """Make a kind of error of a platform. All other attributes of `SourceKind` follow from the motion."""
+        if not re.fullmatch("[a-z][a-z0-9_]*", name):
+            raise ValueError(f"{name!r} is no name of a kind; accepted: small letters, digits, underscores")
+        if name in _TAKEN_NAMES:
+            raise ValueError(f"{name!r} is no name of a kind: it has another meaning in the ids of rows")
+        super().__init__(name=name, moves="platform")
+        attributes = {"dimension": dimension, "description": description, "motion": motion, "equation": equation}
+        for attribute, value in attributes.items():
+            object.__setattr__(self, attribute, value)
 
     @property
     def unit(self) -> str:
@@ -219,14 +229,32 @@ class MotionKind(SourceKind):
         Raises
         ------
         MotionKindError
-            The motion has another shape, or numbers that are not finite.
+            The function of the package raises an exception or changes the times, or the motion has another shape, or
+            numbers that are not real or not finite.
         """
-        motion = np.asarray(self.motion(path, times), dtype=float)
+        given = times.view()
+        given.flags.writeable = False
+        try:
+            motion = np.array(self.motion(path, given))
+        except MemoryError:
+            raise
+        except Exception as error:  # whatever somebody's function raises, it is no fault of this package
+            raise MotionKindError(f"{self.origin}: its motion raises {_words_of(error)}") from error
+        if motion.dtype.kind not in "biuf":
+            raise MotionKindError(f"{self.origin}: its motion has the type {motion.dtype}; accepted: real numbers")
         if motion.shape != (3, *times.shape):
-            raise MotionKindError(f"{self.name}: motion has the shape {motion.shape}; accepted: {(3, *times.shape)}")
+            raise MotionKindError(
+                f"{self.origin}: its motion has the shape {motion.shape}; accepted: {(3, *times.shape)}"
+            )
         if not np.isfinite(motion).all():
-            raise MotionKindError(f"{self.name}: motion has numbers that are not finite")
-        return motion
+            raise MotionKindError(f"{self.origin}: its motion has numbers that are not finite")
+        return motion.astype(float)
+
+    @property
+    def origin(self) -> str:
+        """Words for the kind, with the distribution that provides it, if an entry point does."""
+        distribution = _DISTRIBUTIONS.get(self.name)
+        return f"registered kind {self.name}" + (f" of the distribution {distribution}" if distribution else "")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -249,16 +277,31 @@ class SumKind(ErrorKind):
 
 
 _KINDS: dict[str, ErrorKind] = {}
+_DISTRIBUTIONS: dict[str, str] = {}  # names of distributions whose entry points provide a kind, by name of the kind
+_ENTRY_POINT_FAULTS: list[str] = []  # sentences about entry points that give no kind
 
 
-def register(kind: ErrorKind) -> None:
+def _words_of(error: BaseException) -> str:
+    """Name and message of an exception that the code of another package raised."""
+    return printable(f"{type(error).__name__}: {error}"[:_MAX_CHARACTERS])
+
+
+def register(kind: MotionKind) -> None:
     """Add a kind of error to those that every command knows.
 
     Raises
     ------
+    TypeError
+        The object is no `MotionKind`. Only a motion says everything about a kind.
     ValueError
         Another kind with the same name is registered.
     """
+    if not isinstance(kind, MotionKind):
+        raise TypeError(f"{kind!r} is no bisar_budget.MotionKind")
+    _add(kind)
+
+
+def _add(kind: ErrorKind) -> None:
     if _KINDS.setdefault(kind.name, kind) is not kind:
         raise ValueError(f"a kind of error named {kind.name!r} is registered already")
 
@@ -332,18 +375,49 @@ for _kind in (
     SumKind(name="declare"),
     SumKind(name="specification", id_form="{kind}.{axis}"),
 ):
-    register(_kind)
+    _add(_kind)
 
 
 @cache
 def _read_entry_points() -> None:
-    """Register the kinds of error that installed packages provide as entry points; done once."""
+    """Register the kinds of error that installed packages provide as entry points; done once.
+
+    An entry point that gives no kind becomes a fault, and does not end commands that do not need its kind. If two
+    distributions provide kinds with the same name, none of them is registered.
+    """
     from importlib.metadata import entry_points
 
+    provided: dict[str, dict[str, MotionKind]] = {}  # by name of the kind and of the distribution
     for entry_point in entry_points(group=ENTRY_POINT_GROUP):
-        loaded = entry_point.load()
-        if isinstance(loaded, ErrorKind) and _KINDS.get(loaded.name) is not loaded:
-            register(loaded)
+        distribution = entry_point.dist.name if entry_point.dist else entry_point.value
+        words = f"The entry point {entry_point.name} of the distribution {distribution} gives no kind of error"
+        try:
+            loaded = entry_point.load()
+        except Exception as error:  # whatever the module of another package raises
+            _ENTRY_POINT_FAULTS.append(f"{words}: {_words_of(error)}")
+            continue
+        if isinstance(loaded, MotionKind):
+            provided.setdefault(loaded.name, {})[distribution] = loaded
+        else:
+            _ENTRY_POINT_FAULTS.append(
+                f"{words}: it is no bisar_budget.MotionKind, but of the type {type(loaded).__name__}"
+            )
+    for name, by_distribution in provided.items():
+        distributions = " and ".join(by_distribution)
+        if len(by_distribution) > 1:
+            _ENTRY_POINT_FAULTS.append(f"The distributions {distributions} provide kinds of error named {name!r}")
+        elif _KINDS.setdefault(name, kind := by_distribution[distributions]) is kind:
+            _DISTRIBUTIONS[name] = distributions
+        else:
+            _ENTRY_POINT_FAULTS.append(
+                f"The distribution {distributions} provides a kind of error named {name!r}, but another has that name"
+            )
+
+
+def entry_point_faults() -> tuple[str, ...]:
+    """Sentences about entry points of installed packages that give no kind of error."""
+    _read_entry_points()
+    return tuple(_ENTRY_POINT_FAULTS)
 
 
 def kind_of(name: str) -> ErrorKind:

@@ -223,6 +223,10 @@ class WorkerLostError(Exception):
     """A worker process ended before its work did."""
 
 
+class MotionKindError(ValueError):
+    """A registered kind of error gives a motion that cannot be used; the message names the kind and its package."""
+
+
 class MissionError(Exception):
     """A mission file cannot be used. The error has all faults of the file, in file order.
 

@@ -5,6 +5,7 @@ Most warnings do not change the verdict. A warning that casts doubt on the check
 the file.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -15,9 +16,14 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.budget.judged_requirements import required_keys
-from bisar_budget.constants import LEAST_FALLING_HEIGHT_M, MAX_FLIGHT_SPEED_MPS
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.budget.judged_requirements import negligible_rad, required_keys
+from bisar_budget.constants import (
+    EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2,
+    EARTH_RADIUS_M,
+    LEAST_FALLING_HEIGHT_M,
+    MAX_FLIGHT_SPEED_MPS,
+)
+from bisar_budget.effects.effect import NOWHERE, PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
@@ -31,6 +37,7 @@ from bisar_budget.ranges.resolution import Resolution
 
 _SENSITIVITY = "acceleration_sensitivity"
 
+_MAX_GROUND_HEIGHT_M = 20e3  # of a scene, above a sphere of the Earth's mean radius
 _MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that are not geostationary
 
 
@@ -62,7 +69,7 @@ def file_warnings(
         *_of_the_whole(mission, rows),
         *(_Warned(*warning) for warning in waivers),
         *_unused_correlations(mission),
-        *straight_orbits(mission),
+        *paths_in_doubt(mission),
         *_doubtful_paths(mission),
         *_noisy_fits(mission),
         *_of_instruments(case),
@@ -147,29 +154,75 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
             yield _Warned(("platforms", name, "trajectory"), note)
 
 
-def straight_orbits(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of platforms that move like a satellite but have no `acceleration`.
+def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
+    """Yield warnings of platforms that move like a satellite, but not in free fall.
 
-    The warning gives the acceleration to add. A platform moves like a satellite if it is as fast or as high as one.
-    Over an aperture time T, a missing acceleration a moves the true path away from the straight path by aT²/8, for
-    example 25 m in 5 s. There is no warning if the file states an acceleration, including zero.
+    The warning gives the acceleration of free fall. A path without an acceleration is that of a satellite if it is as
+    fast as one, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a moves the true
+    path away from the straight path by aT²/8, for example 25 m in 5 s. Errors of any other path above 100 km that is
+    not in free fall are judged without the dynamics of an orbit. This gives a warning if these dynamics may change a
+    phase noticeably, or if errors are stated in `ric`, because their velocities then are not against the stars.
     """
+    noticeable = float(negligible_rad(mission))
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
-        if platform.acceleration is not None or platform.is_of_the_earth:
-            continue
         state, axes = platform.state, mission.scene.axes
-        speed = float(norm(state.velocity))
-        is_in_space = speed > _MIN_ORBIT_SPEED_MPS and state.position[2] > LEAST_FALLING_HEIGHT_M
-        if not (speed > MAX_FLIGHT_SPEED_MPS or (is_in_space and state.fall is None)):
+        if state.fall is not None:
             continue
-        key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
-        from bisar_budget.paths.earth import free_fall  # the import takes 8 ms and most missions do not need it
+        speed = float(norm(state.velocity))
+        is_unbent = platform.acceleration is None and not platform.is_of_the_earth
+        is_fast = is_unbent and speed > MAX_FLIGHT_SPEED_MPS
+        if not is_fast and state.slant_range < LEAST_FALLING_HEIGHT_M - _MAX_GROUND_HEIGHT_M:
+            continue
+        from bisar_budget.paths.earth import free_fall  # these imports take 8 ms; most missions do not need them
+        from bisar_budget.paths.free_fall import departure_of
 
+        height, departure = (float(number) for number in departure_of(state, axes))
+        if not is_fast and height <= LEAST_FALLING_HEIGHT_M:
+            continue
         acceleration = free_fall(plain_vector(state.position), plain_vector(state.velocity), axes)
-        yield _Warned(
-            key, phrases.satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True
+        key: str = "speed" if platform.velocity is None else "velocity"
+        if is_fast or (is_unbent and speed > _MIN_ORBIT_SPEED_MPS):
+            sentence = phrases.satellite_flies_straight(name, speed, acceleration, axes is not None)
+        elif (phase := _missing_phase(mission, platform, EARTH_RADIUS_M + height)) > noticeable or _is_along_orbit(
+            mission, platform
+        ):
+            sentence = phrases.satellite_does_not_fall(name, height, departure, phase, acceleration, axes is not None)
+            if not is_unbent:
+                key = platform.way if platform.is_of_the_earth else "acceleration"
+        else:
+            continue
+        yield _Warned(("platforms", name, key), sentence, is_doubt=True)
+
+
+def _is_along_orbit(mission: Mission, platform: Platform) -> bool:
+    """Whether the file states errors of a platform in `ric`, whose velocities are inertial only in orbits."""
+    error, common = platform.motion_error, mission.common_motion_error
+    is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
+    return is_of_platform or (common is not None and common.frame == "ric")
+
+
+def _missing_phase(mission: Mission, platform: Platform, distance: float) -> float:
+    """Largest quadratic phase that the dynamics of an orbit may add to declared errors of a platform. [rad]
+
+    `distance` is the platform's distance from the Earth's centre. [m]
+
+    Derived here. Relative to p + vτ, the gradient of gravity and the rotation of the Earth accelerate an error by at
+    most (2μ/r³ + ω²)|δr| + 2ω|δv|. A constant acceleration a over an aperture time T has the phase 2π/λ·aT²/8.
+    """
+    from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
+
+    error, common = platform.motion_error, mission.common_motion_error
+    position, velocity = (
+        math.hypot(*(of_platform or NOWHERE)) + math.hypot(*(of_both or NOWHERE))
+        for of_platform, of_both in (
+            (error.stated("position"), common and common.position),
+            (error.stated("velocity"), common and common.velocity),
         )
+    )
+    gradient = 2 * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 + ROTATION_RATE_RAD_PER_S**2
+    pushed = mission.allocation.coverage_factor * (gradient * position + 2 * ROTATION_RATE_RAD_PER_S * velocity)
+    return float(2 * math.pi / mission.radar.wavelength * pushed * mission.collection.aperture_time**2 / 8)
 
 
 # ---------------------------------------------------------------------- how errors are stated

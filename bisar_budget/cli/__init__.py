@@ -14,7 +14,7 @@ import click
 
 from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE, complain, drop_output, fail
-from bisar_budget.faults import ClusterError, WorkerLostError, printable
+from bisar_budget.faults import ClusterError, MotionKindError, WorkerLostError, printable
 from bisar_budget.front.progress import SAYING
 from bisar_budget.resources import docstring, hold_files, release_files
 
@@ -92,7 +92,7 @@ class _Commands(click.Group):
             except OSError:
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
-        except ClusterError as error:
+        except (ClusterError, MotionKindError) as error:
             fail(str(error))
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")

@@ -52,10 +52,13 @@ def schema(is_of_part: bool, output: str | None) -> None:
 
     The first line of a file names its schema: # yaml-language-server: $schema=mission.schema.json
     """
+    from bisar_budget.error_kinds import entry_point_faults
     from bisar_budget.mission.model import mission_schema
     from bisar_budget.mission.parts import part_schema
 
     text = json.dumps(part_schema() if is_of_part else mission_schema(), indent=2) + "\n"
+    for fault in () if is_of_part else entry_point_faults():
+        complain(f"Warning: {fault}.")
     deliver(text, output, "json")
 
 

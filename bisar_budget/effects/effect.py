@@ -209,8 +209,8 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_motion(self) -> bool:
-        """Whether the error moves platforms or shifts the clock; false for a pure phase error."""
-        return self.unit != "rad"
+        """Whether the error moves platforms or shifts the clock. It is false for a pure phase error."""
+        return self.kind.moves != "image"
 
     @property
     def is_time_tag(self) -> bool:

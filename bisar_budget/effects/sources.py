@@ -23,8 +23,8 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
-from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, MotionKindError, StateKind, kind_of
-from bisar_budget.faults import KeyPath
+from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, StateKind, kind_of
+from bisar_budget.faults import KeyPath, MotionKindError
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
@@ -598,8 +598,8 @@ class ErrorListing:
         strays = np.abs(np.einsum("tn,anc->atc", through, moved) - truth).max()
         if strays > _UNRESOLVED_FRACTION * np.abs(truth).max():
             raise MotionKindError(
-                f"{kind.name}: motion changes faster than {places.size} nodes of the aperture resolve; accepted: a "
-                "smooth motion"
+                f"{kind.origin}: its motion changes faster than {places.size} nodes of the aperture resolve; "
+                "accepted: a smooth motion"
             )
         return moved
 

@@ -660,7 +660,7 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
     Any other path is returned unchanged.
     """
-    if not np.any(np.asarray(state.position[2]) > LEAST_FALLING_HEIGHT_M):
+    if not np.any(np.asarray(state.slant_range) > LEAST_FALLING_HEIGHT_M):  # the height above the Earth is less
         return state
     from bisar_budget.paths.free_fall import fall_of  # takes 8 ms; most missions have no satellite
 

@@ -16,8 +16,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, NamedTuple, TypeGuard, TypeVar
 
 from bisar_budget import units
-from bisar_budget.error_kinds import MotionKind, motion_kind, motion_kinds
-from bisar_budget.faults import InvalidValueError, KeyPath, Problem
+from bisar_budget.error_kinds import MotionKind, entry_point_faults, motion_kind, motion_kinds
+from bisar_budget.faults import InvalidValueError, KeyPath, Problem, sentences
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
@@ -580,9 +580,9 @@ class RegisteredSizes(Reader[dict[str, float]]):
         for name, size in value.items():
             reader = self.below(name)
             if reader is None:
-                near = did_you_mean(name, tuple(motion_kinds()))
+                hint = sentences(did_you_mean(name, tuple(motion_kinds())), *entry_point_faults())
                 problem = Problem(
-                    "is no registered kind of error", f"accepted: {self._accepted()}", near, is_of_key=True
+                    "is no registered kind of error", f"accepted: {self._accepted()}", hint, is_of_key=True
                 )
                 report((*path, name), problem)
                 sizes[name] = INVALID

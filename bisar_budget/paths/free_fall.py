@@ -14,7 +14,13 @@ import numpy as np
 from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2, EARTH_RADIUS_M, LEAST_FALLING_HEIGHT_M
 from bisar_budget.geometry import PlatformState, Vectors, cross, norm
-from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S, SceneAxes, free_fall
+from bisar_budget.paths.earth import (
+    EQUATORIAL_RADIUS_M,
+    J2_FACTOR,
+    ROTATION_RATE_RAD_PER_S,
+    SceneAxes,
+    free_fall,
+)
 
 FREE_FALL_FRACTION = 0.05  # of gravity; a path in free fall has an acceleration that differs by less
 _NODE_COUNT = 12  # of the collocation; over half a radian of an orbit its error is 1e-12 of the motion
@@ -29,7 +35,8 @@ class FreeFall:
     centre : Vectors
         Position of the Earth's centre. [m]
     rotation : Vectors
-        Rate at which the axes turn relative to the stars; zero for a scene without a position on the Earth. [rad/s]
+        Rate at which the axes turn relative to the stars, along the Earth's axis. [rad/s] It is zero for a scene
+        without a position on the Earth; then the Earth is a sphere.
     share : float or (cases,)
         1 in cases with a platform in free fall, and 0 in all other cases. In these other cases errors are
         p + vτ + aτ²/2, without gravity and rotation.
@@ -61,9 +68,9 @@ class FreeFall:
 
         Notes
         -----
-        Derived here. In axes that turn at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gravity gradient
-        G = μ/r³·(3r̂r̂ᵀ − 1). The accelerations are a polynomial that solves the equation at Gauss-Legendre nodes.
-        Their values at the nodes are the solution of one linear system per case.
+        Derived here. In axes that turn at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gravity gradient G.
+        The accelerations are a polynomial that solves the equation at Gauss-Legendre nodes. Their values at the nodes
+        are the solution of one linear system per case.
         """
         collocation = _collocation()
         cases, count = half.size, collocation.times.size
@@ -89,15 +96,30 @@ class FreeFall:
         """Matrices of the linearised dynamics: G − ω×(ω×·) (cases, nodes, 3, 3) [1/s²] and ω×· (cases, 3, 3) [1/s].
 
         G is the gravity gradient, and ω the rate at which the axes turn. `times` are slow times (nodes, cases). [s]
+
+        Derived here. G is the second derivative of the potential of `earth.free_fall`. With the direction p of the
+        Earth's axis, s = r̂·p and the equatorial radius R, the sphere has μ/r³·(3r̂r̂ᵀ − 1), and the flattening adds
+        −μ/r³·(3/2)J₂(R/r)²·[1 − 5s² − (5 − 35s²)r̂r̂ᵀ − 10s(r̂pᵀ + pr̂ᵀ) + 2ppᵀ].
         """
         share = np.broadcast_to(self.share, (cases,))
         offset = np.stack(
             [np.broadcast_to(x - c, times.shape) for x, c in zip(path.place(times), self.centre, strict=True)],
             axis=-1,
         )
-        distance = np.linalg.norm(offset, axis=-1)[..., None, None]
-        outer = offset[..., :, None] * offset[..., None, :]
-        gradient = EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 * (3 * outer / distance**2 - np.eye(3))
+        distance = np.linalg.norm(offset, axis=-1)
+        up = offset / distance[..., None]
+        squared_up, identity = up[..., :, None] * up[..., None, :], np.eye(3)
+        gradient = 3 * squared_up - identity
+        if any(map(np.any, self.rotation)):  # without a place on the Earth, the Earth is a sphere
+            pole = (
+                np.stack([np.broadcast_to(w, times.shape) for w in self.rotation], axis=-1) / ROTATION_RATE_RAD_PER_S
+            )
+            sine = np.sum(up * pole, axis=-1)[..., None, None]
+            mixed = up[..., :, None] * pole[..., None, :]
+            flattened = (1 - 5 * sine**2) * identity - (5 - 35 * sine**2) * squared_up
+            flattened += 2 * pole[..., :, None] * pole[..., None, :] - 10 * sine * (mixed + mixed.swapaxes(-1, -2))
+            gradient -= 1.5 * J2_FACTOR * (EQUATORIAL_RADIUS_M / distance[..., None, None]) ** 2 * flattened
+        gradient *= EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance[..., None, None] ** 3
         x, y, z = (np.broadcast_to(component, (cases,)) * share for component in self.rotation)
         zero = np.zeros(cases)
         spin = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
@@ -150,19 +172,25 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
     A path is in free fall if its acceleration differs from that of free fall by at most 5 % of gravity, μ/r². The
     coordinates of the path may be arrays (cases,). Then `share` of the result says which cases are in free fall.
     """
-    fall = of_scene(axes)
-    x, y, z = (component - centre for component, centre in zip(path.position, fall.centre, strict=True))
-    distance = norm((x, y, z))
-    is_high = distance - EARTH_RADIUS_M > LEAST_FALLING_HEIGHT_M
-    if not np.any(is_high):
-        return None
-    falling = free_fall(path.position, path.velocity, axes)
-    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
-    apart = norm((u, v, w))
-    falls = is_high & (apart <= FREE_FALL_FRACTION * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**2)
+    height, departure = departure_of(path, axes)
+    falls = (height > LEAST_FALLING_HEIGHT_M) & (departure <= FREE_FALL_FRACTION)
     if not np.any(falls):
         return None
+    fall = of_scene(axes)
     return fall if np.all(falls) else FreeFall(fall.centre, fall.rotation, np.asarray(falls, dtype=float))
+
+
+def departure_of(path: PlatformState, axes: SceneAxes | None) -> tuple[PerCase, PerCase]:
+    """Height of a path above a spherical Earth [m], and departure of its acceleration from that of free fall.
+
+    The departure is a fraction of gravity, μ/r². Both are numbers, or arrays (cases,).
+    """
+    centre = of_scene(axes).centre
+    x, y, z = (component - origin for component, origin in zip(path.position, centre, strict=True))
+    distance = norm((x, y, z))
+    falling = free_fall(path.position, path.velocity, axes)
+    u, v, w = (stated - fallen for stated, fallen in zip(path.acceleration, falling, strict=True))
+    return distance - EARTH_RADIUS_M, norm((u, v, w)) * distance**2 / EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 
 
 @dataclass(frozen=True, eq=False)

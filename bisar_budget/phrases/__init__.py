@@ -66,7 +66,12 @@ from bisar_budget.phrases.vibration_sentences import (
     slower_than_three_cycles,
     spectrum_shakes,
 )
-from bisar_budget.phrases.warning_sentences import WARNING_SENTENCES, fit_changes_allowables, satellite_flies_straight
+from bisar_budget.phrases.warning_sentences import (
+    WARNING_SENTENCES,
+    fit_changes_allowables,
+    satellite_does_not_fall,
+    satellite_flies_straight,
+)
 
 __all__ = (
     "NOTHING",
@@ -105,6 +110,7 @@ __all__ = (
     "quadratic_phase_over",
     "rule_misplaces",
     "runs_along_the_ground",
+    "satellite_does_not_fall",
     "satellite_flies_straight",
     "seen_of_vibration",
     "share_of_power_over",

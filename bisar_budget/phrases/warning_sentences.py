@@ -72,6 +72,34 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
     `speed` is in m/s. `acceleration` has the components of the acceleration on a circular orbit [m/s²], which the
     path lacks.
     """
+    return (
+        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
+        f"A circular orbit has {_of_free_fall(acceleration, has_axes)}"
+    )
+
+
+@composed
+def satellite_does_not_fall(
+    platform: str, height: float, departure: float, phase: float, acceleration: Sequence[float], has_axes: bool
+) -> str:
+    """Sentence for a path that is as high as a satellite's, but not in free fall.
+
+    `height` is in m. `departure` is the difference from the acceleration of free fall, as a fraction of gravity.
+    `phase` is the quadratic phase that the dynamics of an orbit may add to the declared errors. [rad]
+    `acceleration` has the components of the acceleration of free fall. [m/s²]
+    """
+    missing = "" if has_axes else " If the acceleration is Earth-fixed, add scene.latitude, longitude and height."
+    return (
+        f"platforms.{platform}: a path {height / 1e3:.0f} km high is a satellite's, but its acceleration differs "
+        f"from that of free fall by {100 * departure:.3g} % of gravity, and 5 % is accepted. Its errors are judged "
+        f"without the dynamics of an orbit, which may add a QPE of up to {phase:.2g} rad, and "
+        f"velocity errors in ric are rates of Earth-fixed vectors.{missing} Free fall has "
+        f"{_of_free_fall(acceleration, has_axes)}"
+    )
+
+
+def _of_free_fall(acceleration: Sequence[float], has_axes: bool) -> str:
+    """Words for the acceleration of free fall, as a line of the file, and what it takes into account."""
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"
@@ -80,7 +108,4 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
             "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
             "latitude)"
         )
-    return (
-        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
-        f"A circular orbit has acceleration: [{components}] {how}"
-    )
+    return f"acceleration: [{components}] {how}"

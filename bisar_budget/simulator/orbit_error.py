@@ -1,7 +1,7 @@
 """Path error of a platform in free fall: the orbit from the measured state minus the orbit from the true state.
 
-Both orbits are integrated with the full law of gravity. The budget uses the linearised dynamics of `paths.free_fall`
-instead. The simulator does not use them, because it checks the budget.
+Both orbits are integrated with the full law of gravity of a flattened Earth. The budget uses the linearised dynamics
+of `paths.free_fall` instead. The simulator does not use them, because it checks the budget.
 """
 
 import math
@@ -12,6 +12,7 @@ import numpy as np
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2
 from bisar_budget.geometry import PlatformState
+from bisar_budget.paths.earth import EQUATORIAL_RADIUS_M, J2_FACTOR
 
 _STEP_COUNT = 64  # Runge-Kutta steps on each side of mid-aperture
 _ORDER = 14  # order of the polynomial fitted to the differences of both orbits
@@ -58,10 +59,7 @@ def orbit_error(
 
         The first axis is the orbit, true and then measured. The second axis is the velocity, then the acceleration.
         """
-        places = states[:, 0]
-        fallen = (
-            -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 * places / np.linalg.norm(places, axis=1, keepdims=True) ** 3
-        )
+        fallen = _gravity(states[:, 0], rotation)
         fallen[1] += _turned_by(rotation, time) @ push
         return np.stack((states[:, 1], fallen), axis=1)
 
@@ -79,6 +77,24 @@ def orbit_error(
             states = states + step / 6 * (first + 2 * second + 2 * third + fourth)
     fitted = np.polynomial.legendre.legfit(times / half, differences, _ORDER)
     return np.asarray(np.polynomial.legendre.legval(slow_time / half, fitted).T)
+
+
+def _gravity(places: Floats, rotation: Floats) -> Floats:
+    """Gravity at places (n, 3) relative to the Earth's centre. [m/s²]
+
+    The Earth's axis is along `rotation`, its rate of rotation. Gravity is the gradient of the potential
+    (μ/r)·[1 − J₂·(R/r)²·(3z²/r² − 1)/2], where z is the component along the axis and R the equatorial radius. Without
+    rotation the Earth is a sphere.
+    """
+    distance = np.linalg.norm(places, axis=1, keepdims=True)
+    pull = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3
+    rate = float(np.linalg.norm(rotation))
+    if rate == 0:
+        return np.asarray(pull * places)
+    pole = rotation / rate
+    along = places @ pole[:, None]
+    oblate = 1.5 * J2_FACTOR * (EQUATORIAL_RADIUS_M / distance) ** 2
+    return np.asarray(pull * (places + oblate * ((1 - 5 * (along / distance) ** 2) * places + 2 * along * pole)))
 
 
 def _turned_by(rotation: Floats, time: float) -> Floats:

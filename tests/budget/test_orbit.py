@@ -69,8 +69,64 @@ def test_each_platform_is_warned_of_at_its_velocity() -> None:
     assert len(set(lines)) == 2
 
 
-def test_an_acceleration_in_the_file_is_a_decision() -> None:
-    assert warned(platforms__transmitter={**SATELLITE, "acceleration": [0, 0, 0]}) == []
+@pytest.mark.parametrize(("share", "count"), [(0.0, 1), (0.949, 1), (0.951, 0), (1.049, 0), (1.051, 1)])
+def test_an_acceleration_that_is_not_that_of_free_fall_is_a_doubt(share: float, count: int) -> None:
+    """Beyond 5 % of gravity the errors have no dynamics of an orbit, and nothing said so."""
+    fall = free_fall((353.9e3, 0.0, 505.4e3), (0.0, 7.6e3, 0.0), None)
+    stated = {
+        **SATELLITE,
+        "acceleration": [f"{share * part:.6f} m/s^2" for part in fall],
+        "motion_error": {"position": ["0 m", "500 m", "0 m"], "source": "assumed"},
+    }
+    found = findings(platforms__transmitter=stated)
+    doubts = [warning for warning in found.warnings if "differs from that of free fall" in warning.message]
+    assert len(doubts) == count
+    if count:
+        assert doubts[0].is_doubt
+        assert doubts[0].message.code == "satellite-does-not-fall"
+        assert f"by {100 * abs(1 - share):.3g} % of gravity" in doubts[0].message
+        assert "add scene.latitude" in doubts[0].message
+
+
+def test_an_acceleration_in_the_file_is_a_decision_if_errors_are_small() -> None:
+    """The dynamics of an orbit change the effect of 1 mm by less than 1e-6 rad."""
+    stated = {**SATELLITE, "acceleration": [0, 0, 0], "motion_error": {"position": "1 mm"}}
+    assert warned(platforms__transmitter=stated) == []
+
+
+def test_below_100_km_an_acceleration_in_the_file_is_a_decision() -> None:
+    low = {"position": ["35.4 km", 0, "50.5 km"], "velocity": [0, "3001 m/s", 0]}
+    assert warned(platforms__transmitter={**low, "acceleration": [0, 0, 0]}) == []
+
+
+def test_a_satellite_low_over_the_horizon_falls_too() -> None:
+    """It is 460 km high, but only 29 km above the plane of the scene."""
+    position = (2300e3, 0.0, 29e3)
+    fall = [f"{part:.4f} m/s^2" for part in free_fall(position, (0.0, 7.6e3, 0.0), None)]
+    flight = {"position": list(position), "velocity": [0, "7.6 km/s", 0]}
+    large = {"motion_error": {"position": "500 m"}}
+    assert warned(platforms__transmitter={**flight, **large, "acceleration": fall}) == []
+    assert len(warned(platforms__transmitter={**flight, **large, "acceleration": [0, 0, 0]})) == 1
+
+
+@pytest.mark.parametrize(("aperture_time", "status"), [("4 s", "pass"), ("600 s", "warn")])
+def test_a_geostationary_satellite_needs_the_latitude_in_long_apertures(aperture_time: str, status: str) -> None:
+    """It is still in Earth-fixed axes; without a place on the Earth nothing says that it falls.
+
+    Gravity and the rotation may give 0.9 m of position error a phase of 0.12 rad in 600 s, and 5 µrad in 4 s.
+    """
+    still = {"position": ["-2000 km", "-25000 km", "27000 km"], "velocity": [0, 0, 0]}
+    errors = {"motion_error": {"frame": "scene", "position": "0.5 m", "source": "assumed"}}
+    found = findings(
+        platforms__transmitter={**still, **errors},
+        platforms__receiver={"position": ["3 km", "0 m", "1 km"], "velocity": [0, "1 m/s", 0]},
+        radar={"center_frequency": "10 GHz", "bandwidth": "10 MHz"},
+        collection={"aperture_time": aperture_time},
+        requirements={"quadratic_phase_error": "45 deg"},
+    )
+    assert found.status == status
+    doubts = [warning for warning in found.warnings if "differs from that of free fall" in warning.message]
+    assert len(doubts) == (status == "warn")
 
 
 @pytest.mark.parametrize("format_name", sorted(set(FORMATS) - {"csv", "needs"}))  # formats of rows alone

@@ -8,6 +8,7 @@ import io
 import json
 import math
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from tests.contract.error_keys import (
     DESCRIBING_KEYS,
     ERROR_KEYS,
     OSCILLATOR,
+    RECEIVER,
     Document,
     keys_of_the_model,
     mission_with,
@@ -300,6 +302,49 @@ def test_monte_carlo_draws_the_error_or_says_that_it_does_not(key: str) -> None:
     for name in shares:
         requirement = sigmas[name]
         assert requirement.sigma == pytest.approx(requirement.sigma_rss, rel=DEVIATIONS / math.sqrt(2 * DRAWS))
+
+
+# What errors of a section affect, as their kinds have to say; a platform's section is that of its motion errors.
+AFFECTED = {
+    "scene": "platform",
+    "platforms": "platform",
+    "common_motion_error": "platform",
+    "timing_error": "clock",
+    "synchronization": "clock",
+    "propagation": "air",
+    "other_errors": "image",
+}
+
+
+# Rows about vibrations and tones, which are judged as stated. Of a vibration, only noise has the factor.
+TONES = re.compile(r"receiver\.(vibration\.(sinusoidal|wideband)|oscillator\.spur\.0|oscillator\.acceleration\.0)")
+STATED_KEYS = pytest.mark.parametrize(
+    "key", sorted({*ERROR_KEYS} - {f"{RECEIVER}motion_error.covariance.correlation"})
+)  # without the key whose row is a sum
+
+
+@STATED_KEYS
+def test_a_kind_says_what_its_errors_affect(key: str) -> None:
+    affected = "clock" if key.startswith(OSCILLATOR) else AFFECTED[key.split(".")[0]]
+    assert row_of(key).subject.source_kind.moves == affected
+
+
+@STATED_KEYS
+def test_a_kind_says_whether_the_coverage_factor_multiplies_its_errors(key: str) -> None:
+    """The size of a row has the factor if its kind says so; drawn errors do not have it."""
+    document = mission_with_key(key)
+    document["allocation"] = {"coverage_factor": 2}
+    (covered,) = [row for row in bb.check(loaded(document)).findings.rows if row.id == ERROR_KEYS[key].row]
+    row = row_of(key)
+    if row.unit != "dB" and not TONES.match(row.id):  # a level is relative to what the file states
+        factor = 2 if row.subject.source_kind.is_covered else 1
+        assert covered.declared == pytest.approx(factor * row.declared, rel=1e-9)
+    for with_factor, without in zip(drawn_from(document), drawn_from(mission_with_key(key)), strict=True):
+        assert with_factor.sigma == pytest.approx(without.sigma, rel=1e-6)
+
+
+def drawn_from(document: Document) -> Sequence[Any]:
+    return bb.monte_carlo(loaded(document), 200).requirements
 
 
 @pytest.mark.parametrize("key", DESCRIBING_KEYS)

@@ -143,12 +143,30 @@ def test_simulate_flies_it(folder: Path) -> None:
     assert np.hypot(*moved) > 2 * spacing
 
 
-def test_a_requirement_can_ask_for_it(folder: Path) -> None:
-    for word in ("phase_centre_drift", ROW):
-        change = ("--set", f"requirements.declare=[{word}]")
-        assert "not declared" not in run(folder, "check", "mission.yaml", *change).partition("Declared")[0]
-        text = run(folder, "check", "without.yaml", *change, codes=(1,))
-        assert "motion_error.registered.phase_centre_drift" in text
+@pytest.mark.parametrize(
+    ("word", "status", "codes"), [(ROW, "pass", (0,)), ("phase_centre_drift", "not_evaluated", (1,))]
+)
+def test_a_requirement_can_ask_for_it(folder: Path, word: str, status: str, codes: tuple[int, ...]) -> None:
+    """The mission of the page declares it for the receiver alone; the word of the kind asks for both platforms."""
+    change = ("--set", f"requirements.declare=[{word}]")
+    assert declared(folder, "mission.yaml", *change, codes=codes)["status"] == status
+    for file in ("mission.yaml", "without.yaml")[status == "pass" :]:
+        row = declared(folder, file, *change, codes=(1,))
+        assert row["status"] == "not_evaluated"
+        assert "motion_error.registered.phase_centre_drift" in row["reason"]
+
+
+def test_a_requirement_of_both_platforms_is_met_by_both(folder: Path) -> None:
+    other = ("--set", f"{KEY.replace('receiver', 'transmitter')}=1 mm/s")
+    change = ("--set", "requirements.declare=[phase_centre_drift]")
+    assert declared(folder, "mission.yaml", *change, *other, codes=(0,))["status"] == "pass"
+
+
+def declared(folder: Path, file: str, *options: str, codes: tuple[int, ...]) -> dict[str, str]:
+    """Row `mission.declare` of a check."""
+    (mission,) = json.loads(run(folder, "check", file, *options, "--format", "json", codes=codes))["missions"]
+    (row,) = (row for row in mission["rows"] if row["id"] == "mission.declare")
+    return row
 
 
 def test_reports_name_it(folder: Path) -> None:

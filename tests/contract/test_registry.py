@@ -1,14 +1,24 @@
 """The registry of kinds of error: ids of rows, names, and kinds that a package adds."""
 
-from collections.abc import Callable
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
 import bisar_budget as bb
 from bisar_budget import error_kinds, units
-from bisar_budget.error_kinds import kind_of, kinds
-from tests.conftest import ROOT
+from bisar_budget.cli import cli
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.error_kinds import SourceKind, kind_of, kinds
+from bisar_budget.faults import MotionKindError
+from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.changes import all_keys
+from tests.conftest import APART, ROOT
 
 # Ids that the contract lists, by kind, owner, axis and entry.
 IDS = {
@@ -70,6 +80,39 @@ def test_a_name_fits_into_a_row_id(name: str) -> None:
         kind(name)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        *PLATFORMS,
+        "mission",
+        "clock",
+        "common",
+        "covariance",
+        *{axis for axes in FRAME_AXES.values() for axis in axes},
+    ],
+)
+def test_a_name_with_another_meaning_is_refused(name: str) -> None:
+    """`receiver.covariance` is the group of the errors of a covariance, beside which a kind had the same id."""
+    with pytest.raises(ValueError, match="another meaning in the ids of rows"):
+        kind(name)
+
+
+OTHER_FACTS = sorted({each.name for each in fields(SourceKind)} - {"name"})
+
+
+@pytest.mark.parametrize("fact", OTHER_FACTS)
+def test_the_motion_says_everything_about_a_registered_kind(fact: str) -> None:
+    """A kind with other facts than those of a motion was accepted, and judged, flown or drawn as something else."""
+    with pytest.raises(TypeError, match=fact):
+        bb.MotionKind(name="untrue", dimension=units.LENGTH, description="Error.", motion=still, **{fact: "time_tag"})
+
+
+def test_nothing_but_a_motion_is_registered() -> None:
+    """A kind without a motion was accepted, and no command knew it."""
+    with pytest.raises(TypeError, match="MotionKind"):
+        bb.register(SourceKind(name="leak", moves="air"))
+
+
 def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
     bb.register(kind("moves_nothing"))
     mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
@@ -78,6 +121,23 @@ def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
     ]
     assert (row.declared, row.allowable) == (1.0, None)
     assert row.displacement_m == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("dimension", [units.ANGLE, units.RATIO, units.SPEED], ids=lambda dimension: dimension.si)
+def test_a_motion_has_a_size_of_any_dimension(dimension: units.Dimension) -> None:
+    """An error in rad was taken for a pure phase error, and no check of it ended."""
+
+    def north(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, 0 * times + 1, 0 * times])
+
+    bb.register(bb.MotionKind(name="tilt", dimension=dimension, description="Tilt.", motion=north))
+    mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
+    size = f"1 {dimension.si}" if dimension.si not in ("", "1") else 1.0
+    tilted = mission.replace({"platforms.receiver.motion_error.registered.tilt": size})
+    shifted = mission.replace({"platforms.receiver.motion_error.position": ["0 m", "1 m", "0 m"]})
+    row, position = bb.check(tilted)["receiver.tilt"], bb.check(shifted)["receiver.position.y"]
+    assert row.displacement_m == pytest.approx(position.displacement_m, rel=1e-4)
+    assert row.utilization == pytest.approx(position.utilization, rel=1e-4)
 
 
 def test_both_platforms_may_have_it_and_its_sign_counts() -> None:
@@ -139,7 +199,7 @@ def test_large_draws_of_a_registered_kind_are_those_of_its_motion() -> None:
 def refused(name: str, motion: Callable[..., np.ndarray]) -> pytest.ExceptionInfo[ValueError]:
     bb.register(bb.MotionKind(name=name, dimension=units.LENGTH, description="Error.", motion=motion))
     mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
-    with pytest.raises(error_kinds.MotionKindError) as refusal:
+    with pytest.raises(MotionKindError) as refusal:
         bb.check(mission.replace({f"platforms.receiver.motion_error.registered.{name}": "1 m"}))
     return refusal
 
@@ -148,6 +208,140 @@ def test_a_motion_without_numbers_or_of_another_shape_is_no_pass() -> None:
     """NaN gave a row without a limit that did not fail."""
     assert "not finite" in str(refused("nothing", lambda path, times: np.full((3, *times.shape), np.nan)).value)
     assert "shape" in str(refused("turned", lambda path, times: np.zeros((*times.shape, 3))).value)
+
+
+def raising(path: object, times: np.ndarray) -> np.ndarray:
+    raise RuntimeError("no motion\x1b[31m today")
+
+
+def writing(path: object, times: np.ndarray) -> np.ndarray:
+    times *= 2
+    return np.stack([times, times, times])
+
+
+def without_numbers(path: object, times: np.ndarray) -> np.ndarray:
+    return np.full((3, *times.shape), np.nan)
+
+
+UNUSABLE = [
+    (raising, "raises RuntimeError: no motion\\x1b[31m today"),
+    (writing, "raises ValueError"),
+    (without_numbers, "not finite"),
+    (lambda path, times: [times, 0], "raises ValueError"),
+    (lambda path, times: np.stack([times, times, times]) * 1j, "type complex128; accepted: real numbers"),
+    (lambda path, times: np.ones((3, *times.shape), dtype=str), "type"),
+]
+
+
+@pytest.mark.parametrize(("motion", "words"), UNUSABLE)
+def test_an_unusable_motion_is_no_fault_of_the_tool(
+    motion: Callable[..., np.ndarray], words: str, tmp_path: Path
+) -> None:
+    """Such a motion ended the commands with "a fault of the tool itself" and 3."""
+    bb.register(bb.MotionKind(name="unusable", dimension=units.LENGTH, description="Error.", motion=motion))
+    result = run_with(tmp_path, "check", "unusable")
+    assert result.exit_code == 2
+    assert "registered kind unusable: its motion" in result.stderr
+    assert words in result.stderr
+    assert "fault of the tool" not in result.stderr
+
+
+def run_with(folder: Path, command: str, kind: str, *options: str) -> Result:
+    """Run a command on a mission with 1 m of a registered kind of error."""
+    key = f"platforms.receiver.motion_error.registered.{kind}=1 m"
+    mission = folder / "mission.yaml"
+    mission.write_text((ROOT / "specs/missions/tandem_x.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    return CliRunner(**APART).invoke(cli, [command, str(mission), "--set", key, *options])
+
+
+PACKAGES = {
+    "broken": "raise RuntimeError('not today')\n",
+    "wrong": "KIND = 5\n",
+    "refused": "import bisar_budget as bb\nKIND = bb.MotionKind(name='A B', dimension=0, description='', motion=0)\n",
+    "first": "",
+    "second": "",
+    "taken": "",
+    "good": "",
+}
+KIND = """
+import numpy as np
+import bisar_budget as bb
+from bisar_budget import units
+
+KIND = bb.MotionKind(
+    name="{name}",
+    dimension=units.LENGTH,
+    description="Shift.",
+    motion=lambda path, times: np.zeros((3, *times.shape)) / {divisor},
+)
+"""
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Distributions, of which most have an entry point that gives no kind."""
+    for name, text in PACKAGES.items():
+        kind = {"first": "both_have_it", "second": "both_have_it", "taken": "velocity"}.get(name, name)
+        (tmp_path / f"e54_{name}.py").write_text(text or KIND.format(name=kind, divisor=1))
+        metadata = tmp_path / f"e54_{name}-1.0.dist-info"
+        metadata.mkdir()
+        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: e54-{name}\nVersion: 1.0\n")
+        (metadata / "entry_points.txt").write_text(f"[bisar_budget.kinds]\n{name} = e54_{name}:KIND\n")
+        monkeypatch.delitem(sys.modules, f"e54_{name}", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(error_kinds, "_ENTRY_POINT_FAULTS", [])
+    monkeypatch.setattr(error_kinds, "_DISTRIBUTIONS", {})
+    caches = (error_kinds._read_entry_points, all_keys)
+    for cache in caches:
+        cache.cache_clear()
+    yield tmp_path
+    for cache in caches:
+        cache.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        (
+            "broken",
+            "The entry point broken of the distribution e54-broken gives no kind of error: RuntimeError: not today",
+        ),
+        (
+            "wrong",
+            "distribution e54-wrong gives no kind of error: it is no bisar_budget.MotionKind, but of the type int",
+        ),
+        ("refused", "'A B' is no name of a kind"),
+        ("both_have_it", "e54-first and e54-second provide kinds of error named 'both_have_it'"),
+        ("taken", "e54-taken provides a kind of error named 'velocity', but another has that name"),
+    ],
+)
+def test_an_entry_point_without_a_kind_is_named_to_whoever_needs_it(installed: Path, name: str, words: str) -> None:
+    result = run_with(installed, "check", name)
+    assert result.exit_code == 2
+    assert "is no registered kind of error" in result.stderr
+    assert words in " ".join(result.stderr.split())
+
+
+def test_an_entry_point_without_a_kind_hinders_nothing_else(installed: Path) -> None:
+    """It ended `schema`, each mission with a registered kind, and each check with a misspelt requirement."""
+    assert run_with(installed, "check", "good").exit_code == 0
+    schema = CliRunner(**APART).invoke(cli, ["schema"])
+    assert schema.exit_code == 0
+    assert "Warning: The entry point broken of the distribution e54-broken" in schema.stderr
+    assert "good" in json.loads(schema.stdout)["definitions"]["MotionError"]["properties"]["registered"]["properties"]
+    misspelt = run_with(installed, "check", "good", "--set", "requirements.location_eror=1 m")
+    assert misspelt.exit_code == 2
+    assert "Did you mean 'requirements.location_error'?" in misspelt.stderr
+
+
+def test_an_unusable_motion_names_its_distribution(installed: Path) -> None:
+    (installed / "e54_good.py").write_text(KIND.format(name="good", divisor=0))
+    result = run_with(installed, "check", "good")
+    assert result.exit_code == 2
+    assert (
+        "registered kind good of the distribution e54-good: its motion has numbers that are not finite"
+        in result.stderr
+    )
 
 
 @pytest.mark.parametrize(("turns", "is_smooth"), [(0.25, True), (0.5, True), (3.0, False), (300.0, False)])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.budget.file_warnings import straight_orbits
+from bisar_budget.budget.file_warnings import paths_in_doubt
 from bisar_budget.faults import MissionError
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import parse_mission
@@ -282,5 +282,5 @@ def test_a_straight_orbit_over_the_earth_is_told_the_acceleration_of_its_own() -
     want = fallen(1.0) - 2 * position + fallen(-1.0)  # per s²; the fourth order leaves ω⁴r/12, 1e-6 m/s²
     state = found.platforms.transmitter.state
     assert earth.free_fall(state.position, state.velocity, found.scene.axes) == pytest.approx(want, abs=2e-5)
-    (warning,) = straight_orbits(found)
+    (warning,) = paths_in_doubt(found)
     assert f"acceleration: [{want[0]:.3f} m/s^2, {want[1]:.3f} m/s^2, {want[2]:.3f} m/s^2]" in warning.message
