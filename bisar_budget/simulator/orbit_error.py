@@ -4,7 +4,6 @@ Both orbits are integrated with the full law of gravity of a flattened Earth. Th
 of `paths.free_fall` instead. The simulator does not use them, because it checks the budget.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -50,58 +49,66 @@ def orbit_error(
     wrong_r = r + np.array(position)
     wrong_v = np.array(state.velocity) + np.array(velocity) + np.cross(rotation, wrong_r)
     half = max(float(np.abs(slow_time).max()), 1e-9)
-    times = np.linspace(-half, half, 2 * _STEP_COUNT + 1)
-    start = np.array(((r, v), (wrong_r, wrong_v)))  # by orbit, then place and velocity
+    step = half / _STEP_COUNT
+    turns = _turned_by(rotation, np.linspace(0.0, half, 2 * _STEP_COUNT + 1))  # at the ends and middles of steps
     push = np.array(acceleration, dtype=float)
+    pushes = np.stack((turns @ push, push @ turns), axis=1)  # a rotation back in time is the transposed one
 
-    def rates(time: float, states: Floats) -> Floats:
-        """Inertial velocity and acceleration on both orbits, in axes fixed at mid-aperture, (2, 2, 3).
+    # Both directions of time are integrated at once, (directions, orbits, 3).
+    way = np.array((1.0, -1.0))[:, None, None]
+    places, velocities = (np.stack((state, state)) for state in ((r, wrong_r), (v, wrong_v)))
 
-        The first axis is the orbit, true and then measured. The second axis is the velocity, then the acceleration.
-        """
-        fallen = _gravity(states[:, 0], rotation)
-        fallen[1] += _turned_by(rotation, time) @ push
-        return np.stack((states[:, 1], fallen), axis=1)
+    def fallen(there: Floats, half_steps: int) -> Floats:
+        """Inertial acceleration on both orbits at the positions `there`, in axes fixed at mid-aperture."""
+        pulled = _gravity(there, rotation)
+        pulled[:, 1] += pushes[half_steps]
+        return pulled
 
-    differences = np.empty((times.size, 3))
-    for sign in (1, -1):
-        states, step = start, sign * half / _STEP_COUNT
-        for index in range(_STEP_COUNT + 1):
-            time = index * step
-            back = _turned_by(rotation, time).T
-            differences[_STEP_COUNT + sign * index] = back @ (states[1, 0] - states[0, 0])
-            first = rates(time, states)
-            second = rates(time + step / 2, states + step / 2 * first)
-            third = rates(time + step / 2, states + step / 2 * second)
-            fourth = rates(time + step, states + step * third)
-            states = states + step / 6 * (first + 2 * second + 2 * third + fourth)
-    fitted = np.polynomial.legendre.legfit(times / half, differences, _ORDER)
+    apart = np.empty((_STEP_COUNT + 1, 2, 3))
+    apart[0] = places[:, 1] - places[:, 0]
+    for index in range(_STEP_COUNT):
+        stride, first = way * step, fallen(places, 2 * index)
+        second_velocities = velocities + stride / 2 * first
+        second = fallen(places + stride / 2 * velocities, 2 * index + 1)
+        third_velocities = velocities + stride / 2 * second
+        third = fallen(places + stride / 2 * second_velocities, 2 * index + 1)
+        fourth_velocities = velocities + stride * third
+        fourth = fallen(places + stride * third_velocities, 2 * index + 2)
+        places = places + stride / 6 * (velocities + 2 * second_velocities + 2 * third_velocities + fourth_velocities)
+        velocities = velocities + stride / 6 * (first + 2 * second + 2 * third + fourth)
+        apart[index + 1] = places[:, 1] - places[:, 0]
+    later = np.einsum("kji,kj->ki", turns[::2], apart[:, 0])
+    earlier = np.einsum("kij,kj->ki", turns[::2], apart[:, 1])
+    differences = np.concatenate((earlier[:0:-1], later))
+    times = np.linspace(-1.0, 1.0, 2 * _STEP_COUNT + 1)  # in halves of the span
+    fitted = np.polynomial.legendre.legfit(times, differences, _ORDER)
     return np.asarray(np.polynomial.legendre.legval(slow_time / half, fitted).T)
 
 
 def _gravity(places: Floats, rotation: Floats) -> Floats:
-    """Gravity at places (n, 3) relative to the Earth's centre. [m/s²]
+    """Gravity at positions (..., 3) relative to the Earth's centre. [m/s²]
 
     The Earth's axis is along `rotation`, its rate of rotation. Gravity is the gradient of the potential
     (μ/r)·[1 − J₂·(R/r)²·(3z²/r² − 1)/2], where z is the component along the axis and R the equatorial radius. Without
     rotation the Earth is a sphere.
     """
-    distance = np.linalg.norm(places, axis=1, keepdims=True)
-    pull = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3
+    distance = np.sqrt((places * places).sum(axis=-1, keepdims=True))
+    pull = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / (distance * distance * distance)
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
         return np.asarray(pull * places)
     pole = rotation / rate
-    along = places @ pole[:, None]
+    along = (places @ pole)[..., None]
     oblate = 1.5 * J2_FACTOR * (EQUATORIAL_RADIUS_M / distance) ** 2
     return np.asarray(pull * (places + oblate * ((1 - 5 * (along / distance) ** 2) * places + 2 * along * pole)))
 
 
-def _turned_by(rotation: Floats, time: float) -> Floats:
-    """Rotation matrix (3, 3) for a rotation at the angular rate `rotation` [rad/s] during `time`. [s]"""
+def _turned_by(rotation: Floats, times: Floats) -> Floats:
+    """Rotation matrices (times, 3, 3) for a rotation at the angular rate `rotation` [rad/s] during `times`. [s]"""
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
-        return np.eye(3)
+        return np.broadcast_to(np.eye(3), (times.size, 3, 3))
     x, y, z = rotation / rate
     spin = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    return np.asarray(np.eye(3) + math.sin(rate * time) * spin + (1 - math.cos(rate * time)) * spin @ spin)
+    angle = rate * times[:, None, None]
+    return np.asarray(np.eye(3) + np.sin(angle) * spin + (1 - np.cos(angle)) * spin @ spin)
