@@ -8,15 +8,13 @@ requirement covers, and waivers.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.scene import SceneEdges, scene_edges
-from bisar_budget.analysis.spread import noise
-from bisar_budget.arrays import Booleans, Floats, PerCaseFlag
+from bisar_budget.analysis.scene import scene_edges
+from bisar_budget.arrays import Booleans, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
 from bisar_budget.budget.dispersion_row import dispersion_rows
@@ -71,7 +69,7 @@ class JudgedMission:
     unplaced: Mapping[str, Booleans]
     air: StayingAir
     scene: JudgedScene | None
-    floor: Codes  # best possible status of each case
+    status: Codes  # of the mission in each case, (cases,)
     waivers: NDArray[np.intp]  # index in the file of each row's waiver, (rows, n); -1: no waiver
     waived_requirements: Sequence[tuple[Booleans, int]]  # waived cases, and index of waiver or -1
 
@@ -97,17 +95,8 @@ class JudgedMission:
             covered = (is_waived for is_waived, index in requirements if index == waiver_index)
             yield waiver.id, np.any([(self.waivers[rows] == waiver_index).any(axis=0), *covered], axis=0)
 
-    @cached_property
-    def status(self) -> Codes:
-        """Status of the mission in each case, (cases,).
 
-        It is the worst of those row statuses that count in the verdict of a mission, or `floor` if that is worse.
-        """
-        codes = np.array([row.status for row in self.rows])
-        worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
-        return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
-
-
+@np.errstate(all="ignore")
 def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     """Judge every row and every requirement for the analysed cases.
 
@@ -118,230 +107,228 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     today : date
         Day on which waivers are judged, UTC.
     """
-    with np.errstate(all="ignore"):
-        return _Judgement(analysis, today).judge()
+    mission, cases = analysis.mission, analysis.cases
+    judging = Judging(cases, mission.allocation.warn_above, analysis.is_complete)
+    # Limit on the quadratic phase of each owner, including the autofocus gain.
+    limits = {owner: judging.array(analysis.allocation.qpe_allowed(owner)) for owner in _OWNERS}
+    in_doubt = doubted_platforms(mission, cases)
+    errors = ErrorRows(judging, analysis, limits)
+    vibrations = Vibrations(judging, analysis) if _has_vibration_rows(analysis) else None
+    random = RandomRows(judging, analysis)
+    scene = None
+    if mission.scene.radius is not None:  # a search around the edge, which only a stated radius needs
+        scene = JudgedScene(analysis, scene_edges(analysis.errors, analysis.random, limits, analysis.allocation.qpe))
+    families = {
+        model: list(_families(model, judging, analysis, errors, vibrations, random, scene))
+        for model in analysis.gates
+    }
+    by_model = [_rows(model, rows_of_model, cases) for model, rows_of_model in families.items()]
+    rows = [*_undeclared(by_model[-1], analysis, in_doubt), *_stricter(*reversed(by_model))]
+    if mission.requirements.declare:
+        rows.insert(0, Judged.of_none(DECLARATIONS, cases)._replace(metric=DECLARE))
+    of_all = RowStatuses(rows, mission)
+    of_all.require_declarations(analysis.geometry)
+    of_all.doubt_inputs(in_doubt)
+    untaken = untaken_effects(analysis)
+    drifting = unplaced(analysis.together("full"))
+    nowhere = np.zeros(cases, dtype=bool)
+    paths = [is_doubtful for (_, state), is_doubtful in in_doubt.items() if state is not None]
+    is_misplaced = np.any([nowhere, *drifting.values(), *paths], axis=0)
+    has_noise = _has_noise(judging, analysis)
+    air = staying_air(analysis, rows)
+    of_all.doubt_air(air.doubted_rows())
+    by_themselves = of_all.status.copy()
+    of_all.judge_effects(untaken)
+    of_all.doubt_air(air.untaken_rows())
+    of_all.judge_place(is_misplaced)
+    of_all.judge_spread(has_noise)
+    halves = list(half_causes(mission))
+    of_all.judge_halves(halves)
+    before = of_all.status
+    waivers = of_all.waivers(today)
+    after = np.where(waivers >= 0, CODE["waived"], before)
+    of_requirements = {key: holding_place(mission, today, [f"mission.{key}"]) for key in REQUIREMENT_KEYS}
+    states = requirement_states(
+        mission,
+        # The status of a row for other reasons does not matter here, but a waiver of the row counts.
+        np.where((after == CODE["waived"]) & np.isin(by_themselves, _BROKEN_CODES), CODE["waived"], by_themselves),
+        np.array([row.utilization for row in rows]),
+        of_all.judges(),
+        np.array([row.quadratic_use for row in rows]),
+        {key: waiver_index >= 0 for key, waiver_index in of_requirements.items()},
+        before=by_themselves,
+        in_doubt=_doubted_rows(analysis, rows),
+        has_noise=has_noise,
+        is_misplaced=is_misplaced,
+        unjudged=air.doubted_requirements() | {key: True for half in halves for key in half.requirements},
+    )
+    floor = np.min([_floor(analysis), *(state.status for state in states)], axis=0)
+    return JudgedMission(
+        analysis=analysis,
+        families=families,
+        rows=of_all.rows_with(after),
+        before=of_all.rows_with(before),
+        requirements=tuple(states),
+        untaken=untaken,
+        unplaced=drifting,
+        air=air,
+        scene=scene,
+        status=_worst(after, floor),
+        waivers=waivers,
+        waived_requirements=[(state.status == CODE["waived"], of_requirements[state.key]) for state in states],
+    )
 
 
-class _Judgement:
-    def __init__(self, analysis: Analysis, today: date) -> None:
-        self.analysis, self.mission, self.today = analysis, analysis.mission, today
-        self.cases, self.shown = analysis.cases, analysis.shown
-        self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_complete)
+# ---------------------------------------------------------------------- rows of the families
+def _families(
+    model: str,
+    judging: Judging,
+    analysis: Analysis,
+    errors: ErrorRows,
+    vibrations: Vibrations | None,
+    random: RandomRows,
+    scene: JudgedScene | None,
+) -> Iterator[FamilyRow]:
+    """Yield all rows under one gating model, in the order of the JSON output."""
+    needs = analysis.mission.requirements
+    yield from errors.rows(model)
+    if vibrations is not None:
+        yield from vibrations.rows(model)
+    yield from random.rows(model)
+    yield from random.stated_rows(model)
+    yield from spur_rows(judging, analysis, model)
+    yield from accelerated_rows(judging, analysis, model)
+    yield from dispersion_rows(judging, analysis)
+    yield from log_rows(judging, analysis.mission)
+    if needs.pslr is not None:
+        yield pslr_row(judging, analysis.tones, needs.pslr)
+    if needs.islr is not None:
+        yield from random.islr_rows(model)
+    yield from Aggregates(judging, analysis).rows(model)
+    if scene is not None:
+        yield scene.row(judging, model)
+    yield from specification_rows(judging, analysis)
 
-    def judge(self) -> JudgedMission:
-        """Judge every row and every requirement, and return the result."""
-        analysis, mission = self.analysis, self.mission
-        families = {model: list(self._families(model)) for model in analysis.gates}
-        by_model = [self._rows(model, rows_of_model) for model, rows_of_model in families.items()]
-        rows = [*self._undeclared(by_model[-1]), *_stricter(*reversed(by_model))]
-        if mission.requirements.declare:
-            rows.insert(0, Judged.of_none(DECLARATIONS, self.cases)._replace(metric=DECLARE))
-        of_all = RowStatuses(rows, mission)
-        of_all.require_declarations(analysis.geometry)
-        of_all.doubt_inputs(self._in_doubt)
-        untaken = untaken_effects(analysis)
-        drifting = unplaced(analysis.together("full"))
-        nowhere = np.zeros(self.cases, dtype=bool)
-        paths = [is_doubtful for (_, state), is_doubtful in self._in_doubt.items() if state is not None]
-        is_misplaced = np.any([nowhere, *drifting.values(), *paths], axis=0)
-        has_noise = self._has_noise()
-        air = staying_air(analysis, rows)
-        of_all.doubt_air(air.doubted_rows())
-        by_themselves = of_all.status.copy()
-        of_all.judge_effects(untaken)
-        of_all.doubt_air(air.untaken_rows())
-        of_all.judge_place(is_misplaced)
-        of_all.judge_spread(has_noise)
-        halves = list(half_causes(mission))
-        of_all.judge_halves(halves)
-        before = of_all.status
-        waivers = of_all.waivers(self.today)
-        after = np.where(waivers >= 0, CODE["waived"], before)
-        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in REQUIREMENT_KEYS}
-        states = requirement_states(
-            mission,
-            # The status of a row for other reasons does not matter here, but a waiver of the row counts.
-            np.where(
-                (after == CODE["waived"]) & np.isin(by_themselves, _BROKEN_CODES), CODE["waived"], by_themselves
-            ),
-            np.array([row.utilization for row in rows]),
-            of_all.judges(),
-            np.array([row.quadratic_use for row in rows]),
-            {key: waiver_index >= 0 for key, waiver_index in of_requirements.items()},
-            before=by_themselves,
-            in_doubt=self._doubted_rows(rows),
-            has_noise=has_noise,
-            is_misplaced=is_misplaced,
-            unjudged=air.doubted_requirements() | {key: True for half in halves for key in half.requirements},
-        )
-        return JudgedMission(
-            analysis=analysis,
-            families=families,
-            rows=of_all.rows_with(after),
-            before=of_all.rows_with(before),
-            requirements=tuple(states),
-            untaken=untaken,
-            unplaced=drifting,
-            air=air,
-            scene=self._scene,
-            floor=np.min([self._floor(), *(state.status for state in states)], axis=0),
-            waivers=waivers,
-            waived_requirements=[(state.status == CODE["waived"], of_requirements[state.key]) for state in states],
-        )
 
-    # ---------------------------------------------------------------- rows of the families
-    def _families(self, model: str) -> Iterator[FamilyRow]:
-        """Yield all rows under one gating model, in the order of the JSON output."""
-        needs = self.mission.requirements
-        yield from self._errors.rows(model)
-        if self._vibrates or self._shows_vibration:
-            yield from self._vibrations.rows(model)
-        yield from self._random.rows(model)
-        yield from self._random.stated_rows(model)
-        yield from spur_rows(self.judging, self.analysis, model)
-        yield from accelerated_rows(self.judging, self.analysis, model)
-        yield from dispersion_rows(self.judging, self.analysis)
-        yield from log_rows(self.judging, self.mission)
-        if needs.pslr is not None:
-            yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
-        if needs.islr is not None:
-            yield from self._random.islr_rows(model)
-        yield from Aggregates(self.judging, self.analysis).rows(model)
-        if self._scene is not None:
-            yield self._scene.row(self.judging, model)
-        yield from specification_rows(self.judging, self.analysis)
+def _rows(model: str, families: Sequence[FamilyRow], cases: int) -> dict[str, Judged]:
+    """Collect the rows of one model by their ids; rows that exist in no case are omitted.
 
-    def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
-        """Collect the rows of one model by their ids; rows that exist in no case are omitted.
+    Different families may contain the same row in different cases. The parts are merged into one row.
+    """
+    rows: dict[str, Judged] = {}
+    by_model = np.full(cases, MODELS.index(model), np.int8)
+    for row in families:
+        judged = row.judged._replace(model=by_model)
+        row_id = judged.subject.id
+        if row.is_there is True or np.all(row.is_there):
+            rows[row_id] = judged
+        elif np.any(row.is_there):
+            rows[row_id] = (
+                rows.get(row_id, Judged.of_none(judged.subject, cases))
+                .where(row.is_there, judged)
+                ._replace(metric=judged.metric)
+            )
+    return rows
 
-        Different families may contain the same row in different cases. The parts are merged into one row.
-        """
-        rows: dict[str, Judged] = {}
-        by_model = np.full(self.cases, MODELS.index(model), np.int8)
-        for row in families:
-            judged = row.judged._replace(model=by_model)
-            row_id = judged.subject.id
-            if row.is_there is True or np.all(row.is_there):
-                rows[row_id] = judged
-            elif np.any(row.is_there):
-                rows[row_id] = (
-                    rows.get(row_id, Judged.of_none(judged.subject, self.cases))
-                    .where(row.is_there, judged)
-                    ._replace(metric=judged.metric)
-                )
-        return rows
 
-    @cached_property
-    def _errors(self) -> ErrorRows:
-        return ErrorRows(self.judging, self.analysis, self._limits)
+def _has_vibration_rows(analysis: Analysis) -> bool:
+    """Whether a vibration is declared or its row is shown."""
+    return (
+        _vibrates(analysis.mission)
+        or analysis.shown is None
+        or any(row_subject.facts.is_vibration for row_subject in analysis.shown.values())
+    )
 
-    @cached_property
-    def _limits(self) -> Mapping[str, Floats]:
-        """Limit on the quadratic phase [rad] of each owner, (cases,), including the autofocus gain."""
-        allocation = self.analysis.allocation
-        return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
-    @cached_property
-    def _vibrations(self) -> Vibrations:
-        return Vibrations(self.judging, self.analysis)
+def _vibrates(mission: Mission) -> bool:
+    """Whether the mission declares a sinusoidal or wideband vibration."""
+    motions = (getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS)
+    return any(vibration.sinusoidal or vibration.wideband for vibration in motions)
 
-    @property
-    def _vibrates(self) -> bool:
-        motions = (getattr(self.mission.platforms, name).motion_error.vibration for name in PLATFORMS)
-        return any(vibration.sinusoidal or vibration.wideband for vibration in motions)
 
-    @property
-    def _shows_vibration(self) -> bool:
-        return self.shown is None or any(row_subject.facts.is_vibration for row_subject in self.shown.values())
+# ---------------------------------------------------------------------- judgements beyond single rows
+def _undeclared(
+    judged_rows: Mapping[str, Judged],
+    analysis: Analysis,
+    in_doubt: Mapping[tuple[str, StateKind | None], Booleans],
+) -> Iterator[Judged]:
+    """Yield rows for errors that no case declares.
 
-    @cached_property
-    def _random(self) -> RandomRows:
-        return RandomRows(self.judging, self.analysis)
+    These are rows that are always shown, and rows of errors whose path may be less accurate than declared. `in_doubt`
+    marks the cases with such a path, by platform and kind of error.
+    """
+    subjects = dict(analysis.shown or {})
+    for (name, state), is_doubtful in in_doubt.items():
+        if state is None or not is_doubtful.any():  # the residual of a log has its own rows
+            continue
+        axes = (subject(name, state.name, axis) for axis in "xyz")
+        subjects |= {
+            axis_subject.id: axis_subject
+            for axis_subject in axes
+            if is_in_doubt(axis_subject, name, analysis.mission, state)
+        }
+    there = {*judged_rows, DECLARATIONS.id}
+    return (
+        Judged.of_none(axis_subject, analysis.cases)
+        for row_id, axis_subject in subjects.items()
+        if row_id not in there
+    )
 
-    @cached_property
-    def _scene(self) -> JudgedScene | None:
-        if self.mission.scene.radius is None:
-            return None
-        analysis = self.analysis
-        edges: SceneEdges | None = scene_edges(
-            analysis.errors, analysis.random, self._limits, analysis.allocation.qpe
-        )
-        return JudgedScene(analysis, edges)
 
-    # ---------------------------------------------------------------- judgements beyond single rows
-    @cached_property
-    def _in_doubt(self) -> dict[tuple[str, StateKind | None], Booleans]:
-        """Masks of the cases in which a path may be less accurate than declared, by platform and kind of error."""
-        return doubted_platforms(self.mission, self.cases)
+def _has_noise(judging: Judging, analysis: Analysis) -> Booleans:
+    """Find the cases that declare an error that spreads power, or a tone that ISLR limits, (cases,).
 
-    def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
-        """Yield rows for errors that no case declares.
+    A motion error spreads power if the part of its phase beyond the cubic term is not negligible.
+    """
+    array, gates, cases = judging.array, analysis.gates, analysis.cases
+    level = negligible_rad(analysis.mission)
+    has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in analysis.noise[model]]
+    has_any += [np.sqrt(array(phase.variance)) >= level for model in gates for phase in analysis.rests[model]]
+    if analysis.mission.requirements.pslr is None:
+        has_any += [np.broadcast_to(phase.is_there, (cases,)) for phase in analysis.tones]
+    return np.asarray(np.any([np.zeros(cases, bool), *has_any], axis=0))
 
-        These are rows that are always shown, and rows of errors whose path may be less accurate than declared.
-        """
-        subjects = dict(self.shown or {})
-        for (name, state), is_doubtful in self._in_doubt.items():
-            if state is None or not is_doubtful.any():  # the residual of a log has its own rows
-                continue
-            axes = (subject(name, state.name, axis) for axis in "xyz")
-            subjects |= {
-                axis_subject.id: axis_subject
-                for axis_subject in axes
-                if is_in_doubt(axis_subject, name, self.mission, state)
-            }
-        there = {*judged_rows, DECLARATIONS.id}
-        return (
-            Judged.of_none(axis_subject, self.cases)
-            for row_id, axis_subject in subjects.items()
-            if row_id not in there
-        )
 
-    def _has_noise(self) -> Booleans:
-        """Find the cases that declare an error that spreads power, or a tone that ISLR limits, (cases,).
+def _doubted_rows(analysis: Analysis, rows: Sequence[Judged]) -> Booleans:
+    """Mark the rows of oscillators with doubtful noise, (rows, cases)."""
+    doubted = {error.id: error.is_in_doubt for error in analysis.random if np.any(error.is_in_doubt)}
+    in_doubt = np.zeros((len(rows), analysis.cases), dtype=bool)
+    for row_index, row in enumerate(rows) if doubted else ():
+        in_doubt[row_index] = doubted.get(row.subject.id, False)
+    return in_doubt
 
-        A motion error spreads power if the part of its phase beyond the cubic term is not negligible.
-        """
-        array, gates = self.judging.array, self.analysis.gates
-        level = negligible_rad(self.mission)
-        has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in noise(self.analysis, model)]
-        has_any += [
-            np.sqrt(array(phase.variance)) >= level for model in gates for phase in self.analysis.rests(model)
-        ]
-        if self.mission.requirements.pslr is None:
-            has_any += [np.broadcast_to(phase.is_there, (self.cases,)) for phase in self.analysis.tones]
-        return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
-    def _doubted_rows(self, rows: Sequence[Judged]) -> Booleans:
-        """Mark the rows of oscillators with doubtful noise, (rows, cases)."""
-        doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
-        in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
-        for row_index, row in enumerate(rows) if doubted else ():
-            in_doubt[row_index] = doubted.get(row.subject.id, False)
-        return in_doubt
+def _floor(analysis: Analysis) -> Codes:
+    """Return the best status that each case can have, (cases,).
 
-    def _floor(self) -> Codes:
-        """Return the best status that each case can have, (cases,).
+    It is `not_evaluated` if no error is declared. It is `warn` if a path, an oscillator or a lever arm of the file is
+    doubtful. Otherwise it is `pass`.
+    """
+    floor, mission = np.full(analysis.cases, CODE["pass"]), analysis.mission
+    for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
+        platform = getattr(mission.platforms, name)
+        if platform.path is not None and platform.path.doubts:
+            strays_from_log = strays(mission, name) & (not platform.path.samples)
+            floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
+        if platform.acceleration is None and not platform.is_of_the_earth:
+            is_fast = np.asarray(norm(path.velocity)) > MAX_FLIGHT_SPEED_MPS
+            floor[np.broadcast_to(is_fast, floor.shape)] = CODE["warn"]
+    platforms = (getattr(mission.platforms, name) for name in PLATFORMS)
+    if calm_oscillators(mission) or any(map(swings_nothing, platforms)):
+        floor[:] = CODE["warn"]
+    is_random = any(error.declared is not None for error in analysis.random)
+    if not (analysis.errors.stated or _vibrates(mission) or is_random):
+        floor[:] = CODE["not_evaluated"]
+    return floor
 
-        It is `not_evaluated` if no error is declared. It is `warn` if a path, an oscillator or a lever arm of the
-        file is doubtful. Otherwise it is `pass`.
-        """
-        floor, analysis = np.full(self.cases, CODE["pass"]), self.analysis
-        for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
-            platform = getattr(self.mission.platforms, name)
-            if platform.path is not None and platform.path.doubts:
-                strays_from_log = strays(self.mission, name) & (not platform.path.samples)
-                floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
-            if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > MAX_FLIGHT_SPEED_MPS, floor.shape)] = CODE[
-                    "warn"
-                ]
-        platforms = (getattr(self.mission.platforms, name) for name in PLATFORMS)
-        if calm_oscillators(self.mission) or any(map(swings_nothing, platforms)):
-            floor[:] = CODE["warn"]
-        is_random = any(error.declared is not None for error in analysis.random)
-        if not (analysis.errors.stated or self._vibrates or is_random):
-            floor[:] = CODE["not_evaluated"]
-        return floor
+
+def _worst(codes: Codes, floor: Codes) -> Codes:
+    """Return the worst of those row statuses `codes` (rows, cases) that count in the verdict of a mission, (cases,).
+
+    It is `floor`, (cases,), if that is worse.
+    """
+    worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
+    return np.asarray(np.minimum(worst, floor), dtype=np.int8)
 
 
 class RowStatuses:
