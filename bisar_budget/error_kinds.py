@@ -27,9 +27,9 @@ _Entry = TypeVar("_Entry")
 ENTRY_POINT_GROUP = "bisar_budget.kinds"
 _MAX_CHARACTERS = 300  # of the message of an exception of another package
 # Words of row ids, and of groups of rows, that are no kinds: owners, sections and axes.
-_OWNERS = ("transmitter", "receiver", "mission", "clock", "common", "scene")
-_AXES = ("x", "y", "z", "along", "cross", "up", "line_of_sight", "radial", "in_track", "cross_track")
-_TAKEN_NAMES = frozenset((*_OWNERS, *_AXES, "covariance"))
+_TAKEN_OWNERS = ("transmitter", "receiver", "mission", "clock", "common", "scene")
+_TAKEN_AXES = ("x", "y", "z", "along", "cross", "up", "line_of_sight", "radial", "in_track", "cross_track")
+_TAKEN_NAMES = frozenset((*_TAKEN_OWNERS, *_TAKEN_AXES, "covariance"))
 _OWNER_WORDS = {"clock": "timing"}  # owners that have another name in row ids
 
 

@@ -502,8 +502,10 @@ _JACOBI_ROUNDS = 30  # convergence is quadratic: a 6 x 6 matrix needs about five
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
     """Compute the eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, in any order.
 
-    Jacobi's method is used. For equal eigenvalues LAPACK may return different eigenvectors on different machines, and
-    the same seed would then give different draws.
+    Jacobi's method is used, not `numpy.linalg.eigh`. Equal eigenvalues are usual here: three alike axes without
+    correlations, or one correlation in several pairs. Their eigenvectors are then any basis, for which LAPACK
+    libraries differ, and a fixed sign and order do not determine it. The same seed would give different draws on
+    different machines.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]
