@@ -129,7 +129,10 @@ def plain_vector(a: Vectors) -> Vector:
 
 
 def _of_cases(values: Floats, asked: PerCase) -> PerCase:
-    """Return `values` (cases,), but a float if there is one case and the argument `asked` was a number."""
+    """Return `values` (cases,), or a float for a single case.
+
+    A float is returned only if the argument `asked` was a number.
+    """
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
 
@@ -168,11 +171,11 @@ class Fall(Protocol):
         """Motion over the aperture due to unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]
 
         The first three indices are the error (position, velocity, acceleration), its axis, and the component. `half`
-        is half the aperture time [s], and `places` are the nodes in units of it.
+        is half the aperture time [s], and `places` are the slow times of the nodes in units of `half`.
         """
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Velocity error in the axes of the scene for a position error that is constant relative to the stars. [m/s]
+        """Velocity error, in the scene axes, due to a position error that is constant in inertial axes. [m/s]
 
         `position` is the position error, east, north and up. [m]
         """
@@ -186,7 +189,7 @@ class Fall(Protocol):
 
     @property
     def rotation(self) -> Vectors:
-        """Rate at which the axes of the scene rotate relative to the stars. [rad/s]"""
+        """Angular rate vector of the scene axes with respect to inertial space. [rad/s]"""
 
     def of(self, cases: Any) -> "Fall":
         """Select the dynamics of some cases, by their indices."""
@@ -194,7 +197,7 @@ class Fall(Protocol):
 
 @dataclass(frozen=True)
 class Pieces:
-    """Path of several polynomials, each for its own piece of slow time.
+    """Piecewise polynomial path; each polynomial applies to an interval (piece) of slow time.
 
     The first and the last polynomial continue beyond the ends. The time of each piece is relative to the middle of
     the piece, because a polynomial about the midpoint of a long aperture would lose digits in powers of hundreds of
@@ -203,7 +206,7 @@ class Pieces:
     Attributes
     ----------
     starts : tuple
-        Slow times at which the pieces begin, in rising order. The first piece has no start. [s]
+        Slow times at which the pieces begin, in ascending order. The first piece has no start. [s]
     middles : tuple
         Slow time of the middle of each piece, from which its polynomial counts time. [s]
     powers : tuple
@@ -223,7 +226,7 @@ class Pieces:
     def _arrays(self) -> tuple[Floats, Floats, Floats]:
         """The attributes as arrays: starts (pieces - 1, …), middles (pieces, …), powers (pieces, …, order + 1, 3).
 
-        The axis … is that of the cases; it is missing if all numbers are those of one case.
+        Here … is the axis of the cases, which is absent if there is only a single case.
         """
         numbers = [x for powers in self.powers for vector in powers for x in vector]
         every = np.array(np.broadcast_arrays(*self.starts, *self.middles, *numbers), dtype=float)
@@ -410,7 +413,7 @@ class PlatformState:
         return way + sum((absolute(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def _looks(self, duration_s: PerCase) -> VectorArrays:
-        """Positions at evenly spaced times within a duration before and after the midpoint, (samples, cases). [m]"""
+        """Positions at evenly spaced times from `-duration_s` to `duration_s`, (samples, cases) per component. [m]"""
         count = _MIN_LOOK_COUNT if self.curve is None else max(_MIN_LOOK_COUNT, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
@@ -449,7 +452,8 @@ class PlatformState:
     def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:
         """Whether the platform has the frame `name`.
 
-        `margin` is a factor on the threshold below which the horizontal part of the first axis counts as rounding.
+        `margin` multiplies the threshold below which the horizontal part of the first axis counts as a rounding
+        error.
         """
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
@@ -468,8 +472,8 @@ class PlatformState:
         In `track`, the first axis is along the velocity, cross is horizontal and to the left, and up completes the
         frame (vertical in level flight). In `look`, the first axis is the line of sight from the scene centre to the
         platform, cross is horizontal, and up completes the frame. In `ric`, the first axis points away from the
-        Earth's centre. The plane of the orbit contains the velocity relative to the stars; in-track lies in this
-        plane, and cross-track is its normal.
+        Earth's centre. The plane of the orbit contains the inertial velocity; in-track lies in this plane, and
+        cross-track is its normal.
 
         If there are many cases, the axes are NaN in cases without the frame.
 

@@ -69,7 +69,7 @@ class Sampling:
 
     @cached_property
     def centred(self) -> Floats:
-        """Matrix (samples + 1, samples) that maps a history to its deviations from its mean, followed by the mean."""
+        """Matrix (samples + 1, samples) that maps a history to the deviations from its mean, followed by the mean."""
         return np.concatenate((np.eye(self.places.size) - self.fit[0], self.fit[:1]))
 
     @cached_property
@@ -201,12 +201,12 @@ class GroundMatrix:
 
     @property
     def sine(self) -> Floats:
-        """Sine of the angle θ between the ground direction that the band resolves and the one that the turn resolves.
+        """Sine of the angle θ between the ground directions that the bandwidth and the aperture resolve.
 
-        The turn is that of the line of sight within the aperture. The mean gradient, as a matrix, and the covariance
-        of the gradient over the aperture are both scaled to a trace of one. Their sum has the eigenvalues 1 ± cos θ,
-        and the condition cot²(θ/2). For a short aperture θ is the angle between the range gradient and the Doppler
-        gradient.
+        The aperture resolves by the turn of the line of sight. The outer product of the mean gradient with itself and
+        the covariance of the gradient over the aperture are both scaled to unit trace. Their sum has the eigenvalues
+        1 ± cos θ and thus the condition number cot²(θ/2). For a short aperture θ is the angle between the range
+        gradient and the Doppler gradient.
         """
         x, y = self.range_gradient
         square = x * x + y * y
@@ -219,9 +219,10 @@ class GroundMatrix:
 
     @property
     def turning(self) -> Floats:
-        """P₁ part, at the aperture edge, of the gradient component perpendicular to the mean gradient. [m/m]
+        """Linear (P₁) part of the perpendicular component of the range gradient, at the aperture edge. [m/m]
 
-        It is computed from the variance of this component.
+        The component is perpendicular to the mean gradient. Its linear part is computed from its variance over the
+        aperture.
         """
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
@@ -236,7 +237,7 @@ class GroundMatrix:
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
         """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
 
-        `case` are the cases of the points. The fraction is computed by the function `turn`.
+        `case` contains the index of the case of each point. The fraction is computed by the function `turn`.
         """
         return turn(self.determinant, self.orientation, centre, case)
 
@@ -257,8 +258,9 @@ def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) 
 def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
     """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
 
-    The area is the root of the determinant of H. `centre` is the matrix at the scene centres, and `case` are the
-    cases of the points. The sign is negative if the orientation of the gradients is opposite to that at the centre.
+    The area is the square root of the determinant of H. `centre` is the matrix at the scene centres, and `case`
+    contains the index of the case of each point. The sign is negative if the orientation of the gradients is opposite
+    to that at the centre.
     """
     at_centre, orientation_at_centre = centre.determinant, centre.orientation
     if at_centre.size > 1:
@@ -270,13 +272,13 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Two criteria of whether a collection has an image plane, (cases,) each.
+    """Evaluate the two criteria for an image plane, (cases,) each.
 
     The first is whether the sum of the lines of sight turns within the aperture. The second is `GroundMatrix.sine`,
-    the sine of the angle between the directions that band and turn resolve. There is no image plane if the sum does
-    not turn, or if this angle is less than a degree. Both criteria refer to the whole aperture. A full circle
-    therefore has an image plane, and so has an aperture with a moment at which the range and Doppler gradients are
-    parallel.
+    the sine of the angle between the ground directions that the bandwidth and the aperture resolve. There is no
+    image plane if the sum does not turn, or if this angle is less than a degree. Both criteria refer to the whole
+    aperture. A full circle therefore has an image plane, and so has an aperture in which the range and Doppler
+    gradients are parallel only momentarily.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))

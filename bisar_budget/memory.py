@@ -35,9 +35,9 @@ def limit_words() -> str:
 
 
 def spare_threads() -> None:
-    """Have OpenBLAS, if not loaded yet, use one thread, unless the environment sets another number.
+    """Limit OpenBLAS to one thread, if it is not loaded yet and the environment does not set a number of threads.
 
-    If the memory is limited, the number in the environment is replaced too. A second thread makes a check an eighth
+    If the memory is limited, a number set in the environment is overridden. A second thread makes a check an eighth
     slower and never faster, because products of matrices are small here. Each thread takes tens of MB, which count
     towards the limit.
     """
@@ -48,7 +48,7 @@ def spare_threads() -> None:
 
 
 def hold_room(needed: int, purpose: str) -> None:
-    """Raise a `MemoryError` if the memory limit is below `needed`. [B] The message names the purpose."""
+    """Raise a `MemoryError` that names `purpose` if the memory limit is below `needed` [B]."""
     allowed = limit()
     if allowed is not None and allowed < needed:
         raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
@@ -84,7 +84,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _is_near_limit() -> bool:
-    """Whether the process has at some time used nearly all of the memory that the limit allows."""
+    """Whether the peak memory use of the process came close to the limit."""
     allowed = limit()
     if allowed is None:
         return False

@@ -1,4 +1,4 @@
-"""Units that are understood but not accepted: inches, mils, words, and prefixes that are in no table of units.
+"""Units that are recognised but not accepted: inches, mils, unit names in words, and unlisted prefixes.
 
 A message can convert the quantity to an accepted unit, or suggest the intended spelling. It never suggests a unit
 that changes the size of the quantity. The module is imported only after a unit was refused.
@@ -18,7 +18,7 @@ _MIN_PLURAL_CHARACTERS = 4  # shortest plural that is recognised, such as mils o
 
 
 class UnitValue(NamedTuple):
-    """Factor of a unit to SI, and exponents of metre, second and radian in the unit."""
+    """Conversion factor from a unit to SI, and the exponents of metre, second and radian in the unit."""
 
     factor: float
     powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -144,7 +144,7 @@ _SEXAGESIMAL = re.compile(
 
 
 def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
-    """Problem and hint of the message about a number whose unit is in no table of units."""
+    """Problem and hint for the message about a number whose unit is not in any table of units."""
     unit = normal_unit(written)
     sexagesimal = _SEXAGESIMAL.fullmatch(digits + written) if dimension.si == "rad" else None
     if sexagesimal is not None:
@@ -178,13 +178,13 @@ def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, st
 
 
 def is_of(written: str, dimension: Dimension) -> bool:
-    """Whether a unit, accepted or only understood, belongs to a dimension."""
+    """Whether a unit, accepted or only recognised, belongs to a dimension."""
     value = value_of_unit(normal_unit(written))
     return value is not None and value.powers == _powers_of(dimension)
 
 
 def value_of_unit(unit: str) -> UnitValue | None:
-    """Value of a unit that consists of known units in products, quotients, powers and square roots; else None."""
+    """Value of a product, quotient, power or square root of known units; None if the unit cannot be interpreted."""
     tokens: list[str] = []
     end = 0
     while end < len(unit):
@@ -201,9 +201,9 @@ def value_of_unit(unit: str) -> UnitValue | None:
 
 
 def _product(tokens: list[str]) -> UnitValue | None:
-    """Value of a product of units up to the end or a closing bracket; removes its tokens from the list.
+    """Value of a product of units that ends at a closing bracket or at the end; its tokens are removed from the list.
 
-    None if one of the units is unknown.
+    The result is None if a unit is unknown.
     """
     value = UnitValue(1.0)
     sign = 1.0
@@ -276,7 +276,7 @@ def _converted(digits: str, written: str, factor: float, dimension: Dimension) -
 def _respelt(unit: str, dimension: Dimension) -> str:
     """Unit of a dimension whose spelling differs from `unit` only in upper and lower case, or by one typing error.
 
-    The text is empty if there is no such unit, or if two of different size are equally similar to `unit`.
+    The result is empty if there is no such unit, or if two units of different size are equally similar to `unit`.
     """
     candidates = dict(_conceivable(dimension))
     spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
@@ -298,9 +298,9 @@ def _is_one_size(factors: list[float]) -> bool:
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
-    """Yield the units of a dimension with their factors, also those with prefixes that the dimension does not accept.
+    """Yield the units of a dimension and their factors, including units with prefixes that are not accepted.
 
-    A user may have meant such a unit, so it must not be respelt as one of a different size.
+    The user may have meant such a unit, so it must not be corrected to a unit of a different size.
     """
     powers = _powers_of(dimension)
     for unit, factor in dimension.units.items():
@@ -317,7 +317,7 @@ def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
 
 
 def _is_one_slip(a: str, b: str) -> bool:
-    """Whether two texts differ by one extra, missing or wrong letter, or by two exchanged letters."""
+    """Whether two strings differ at most by one extra, missing or wrong letter, or by two transposed letters."""
     if a == b or abs(len(a) - len(b)) > 1:
         return a == b
     start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

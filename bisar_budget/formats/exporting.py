@@ -158,7 +158,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 
 def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
-    """Choose the size of the image area, and enough samples and pulses to have no ambiguities in it."""
+    """Choose the size of the image area, and numbers of samples and pulses that avoid ambiguities in it."""
     T, radar = mission.collection.aperture_time, mission.radar
     try:
         effect = collection.effect(errors.still())
@@ -211,14 +211,14 @@ def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDA
 def _vectors(
     mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
 ) -> tuple[Records, float]:
-    """Compute the parameters of the vectors, one for each pulse, as the CPHD file states them.
+    """Compute the per-vector parameters of the CPHD file, one record for each pulse.
 
     Also returns the time from the start of the collection to the middle of the aperture [s]. `smooth` is the flight
-    `flown` without vibration and fast errors. A pulse is at the scene centre at its slow time. According to the
-    measured positions it leaves the transmitter R_t/c earlier and is received R_r/c later, so the reference time of
-    section 6.5.1 (5) is the slow time. While slow time advances by 1 s, the time of transmission advances by 1 −
-    Ṙ_t/c and the time of reception by 1 + Ṙ_r/c. Velocities with respect to slow time are therefore divided by these
-    factors.
+    `flown` without vibration and fast errors. The slow time of a pulse is the time at which it reaches the scene
+    centre. The pulse leaves the transmitter R_t/c earlier and is received R_r/c later, where both ranges follow from
+    the measured positions. The reference time of section 6.5.1 (5) is thus the slow time. While slow time advances by
+    1 s, the time of transmission advances by 1 − Ṙ_t/c and the time of reception by 1 + Ṙ_r/c. Velocities with
+    respect to slow time are therefore divided by these factors.
     """
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
@@ -461,7 +461,7 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
 
 
 def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[str, str]:
-    """Texts of the declared sizes, by row id, of the errors for which the CPHD standard has no element.
+    """Map row ids to declared sizes, as strings, for the errors that have no element in the CPHD standard.
 
     The sizes do not include the coverage factor. Errors that are already in `added` are left out.
     """
@@ -480,7 +480,7 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
     """Compute the error covariance (6, 6) of position and velocity of one platform, and name its frame.
 
     Units are m², m²/s and m²/s². The frame is `ECF` or `RIC_ECI` of the standard. Declared errors that a covariance
-    cannot express, such as an acceleration, are added as texts to `added`.
+    cannot express, such as an acceleration, are added to `added` as strings.
     """
     error = getattr(mission.platforms, owner).motion_error
     state: PlatformState = getattr(mission.geometry, owner)
@@ -527,7 +527,10 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
 
 
 def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
-    """Rotate a covariance (6, 6) from a frame of a mission to the scene axes, with Earth-fixed velocities."""
+    """Rotate a covariance (6, 6) from a motion-error frame to the scene axes.
+
+    The result refers to Earth-fixed velocities.
+    """
     axes = np.array(state.frame(frame), dtype=float)
     if frame == "ric" and state.fall is not None:
         covariance = with_rate(covariance, -axes @ np.array(state.fall.rotation))

@@ -64,7 +64,8 @@ class _Pulses:
 class _Aperture(NamedTuple):
     """Time interval in which the radar illuminates the scene point.
 
-    `middle` is the middle of the interval, from the start of the collection [s], and `length` is its duration [s].
+    `middle` is the middle of the interval, in seconds after the start of the collection, and `length` is its
+    duration [s].
     """
 
     middle: float
@@ -181,7 +182,7 @@ def _pulses_of_cphd(container: Container, vectors: Records, parameters: Element)
 
 
 def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
-    """Compute the time at which each pulse is at the scene point, an array (pulses,). [s]
+    """Compute the time at which each pulse reaches the scene point, (pulses,). [s]
 
     This is the reference time of CPHD 1.1.0, section 6.5.1 (5).
     """
@@ -339,7 +340,7 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     transmitter_path, receiver_path = _polynomials_of_sicd(xml, is_monostatic)
 
     def pulses_at(times: Floats) -> _Pulses:
-        """Compute times and platform positions for the pulses that are at the scene point at `times`."""
+        """Compute times and platform positions for the pulses that reach the scene point at `times`."""
         sent, received = times, times
         if not is_monostatic:  # a monostatic aperture reference point is at the time in between
             for _ in range(_LIGHT_TIME_STEPS):
@@ -408,12 +409,12 @@ def _aperture_of_sicd(
 ) -> tuple[_Aperture, list[str]]:
     """Compute the aperture of a pixel at the scene point, and make remarks that explain it.
 
-    The aperture is the processed time interval of the file, or a shorter one that is computed from the bandwidth of
-    the image, since a stripmap is processed from more data than one point contributes to. The spatial frequency of
-    the image along its column direction `col` changes by |d(u_t + u_r)/dt · col| f/c per second, where u_t and u_r
-    are unit vectors along the lines of sight. The bandwidth ImpRespBW of a column is the change during the aperture.
-    `middle` is the middle of the aperture [s], and `center` is the centre frequency f [Hz]. `pulses_at` returns the
-    pulses that are at the scene point at given times.
+    The aperture is the processed time interval of the file, or a shorter interval computed from the bandwidth of the
+    image. In a stripmap, for example, a point is illuminated during only part of the processed interval. The spatial
+    frequency of the image along its column direction `col` changes by |d(u_t + u_r)/dt · col| f/c per second, where
+    u_t and u_r are unit vectors along the lines of sight. Its total change during the aperture is the bandwidth
+    ImpRespBW of a column. `middle` is the middle of the aperture [s], and `center` is the centre frequency f [Hz].
+    `pulses_at` returns the pulses that reach the scene point at given times.
     """
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")

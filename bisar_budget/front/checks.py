@@ -50,7 +50,7 @@ _OPTION = "--sweep"
 
 # ---------------------------------------------------------------------- the day of waivers, and its origin
 def day_of(date: str | dt.date | None) -> dt.date:
-    """Day on which waivers are judged: `date`, or else the day of SOURCE_DATE_EPOCH, or else today, UTC.
+    """Day (UTC) for which waivers are judged: `date`, or else the day of SOURCE_DATE_EPOCH, or else today.
 
     Raises
     ------
@@ -76,9 +76,9 @@ def day_of(date: str | dt.date | None) -> dt.date:
 
 
 def day_origin(day: str | dt.date | None, giver: str) -> str:
-    """Name the origin of the day on which waivers are judged, for reports.
+    """Describe, for reports, where the day on which waivers are judged comes from.
 
-    The origin is `giver` if `day` is given, or else the variable SOURCE_DATE_EPOCH, or else the day of the run.
+    This is `giver` if `day` is not None, or else the variable SOURCE_DATE_EPOCH, or else the day of the run.
     """
     if day is not None:
         return giver
@@ -86,7 +86,10 @@ def day_origin(day: str | dt.date | None, giver: str) -> str:
 
 
 def outside_of(model: str | None, day: str | dt.date | None) -> Outside:
-    """Describe the arguments `model` and `day` of a call as influences on a verdict from outside the mission file."""
+    """Record the arguments `model` and `day` of a call as settings from outside the mission file.
+
+    Reports list these settings, because they can change a verdict.
+    """
     options = () if model is None else (Override("--model", model, _CALLER),)
     return Outside(options, day_origin(day, _CALLER), day is not None, _CALLER)
 
@@ -123,14 +126,14 @@ def check(
         Values of one or two keys, as in the function `sweep`. The mission is also checked with each of these values,
         and the report shows the results.
     outside : Outside, optional
-        Origins of `model` and `date` that the report names; by default the caller.
+        Origins of `model` and `date` to name in the report. By default both come from the caller.
 
     Raises
     ------
     MissionError
         The model is unknown.
     QuestionError
-        The values of `sweep` do not fit the mission, such as those of an unknown key, or are too many.
+        There are too many values in `sweep`, or they do not fit the mission, for example because a key is unknown.
     """
     from bisar_budget.front.results import CheckResult
 
@@ -177,7 +180,7 @@ def checked(
     is_verified : bool
         Whether to form images with errors at the limits, and add their verdicts.
     swept : sequence of str
-        Texts `KEY=VALUES` with the values of one or two keys for a trade study; empty if none is requested.
+        Strings `KEY=VALUES` with the values of one or two keys for a trade study; empty if no study is requested.
     is_illustrated : bool
         Whether the report can show pictures. Analyses and images are then kept, and specifications are added.
 
@@ -205,7 +208,10 @@ def pieces(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Piece]:
-    """Check mission files, and return for each its text of the report, without keeping its findings in memory."""
+    """Check mission files, and return the part of the report for each file.
+
+    The findings of a file are not kept in memory.
+    """
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
 
@@ -224,8 +230,8 @@ def drawn_by(
 ) -> "Iterator[Draws | None]":
     """Context manager that yields the settings of a Monte Carlo; None if `draws`, the number of draws, is None.
 
-    The workers of `scheduler` make the draws; if it is None, this machine makes them. `patience` is the longest time
-    for which to wait for a worker of the scheduler [s]. `files` is the number of mission files of the command.
+    The workers of `scheduler` compute the draws; if it is None, this machine computes them. `patience` is the maximum
+    time to wait for a worker of the scheduler [s]. `files` is the number of mission files of the command.
     """
     if draws is None:
         yield None
@@ -240,7 +246,7 @@ def drawn_by(
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-    """Yield the pieces of draws that `make` computes, and show a progress bar.
+    """Yield each batch of draws from `make` together with its tally, and show a progress bar.
 
     For more than a million draws, the time is estimated first, and the user is told if it is more than a minute.
     """
@@ -267,7 +273,7 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
 
 # ---------------------------------------------------------------------- images
 def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
-    """Form images with errors at the limits of each usable mission, and add the verdicts of the images to it.
+    """Form images of each usable mission with errors at their limits, and add the verdicts from these images.
 
     If `is_illustrated`, images for the most important rows are added too. Unusable missions are returned unchanged.
     """
@@ -297,7 +303,7 @@ def with_studies(
 ) -> list[CheckedMission]:
     """Check each usable mission with all given values of one or two keys, and add the results as a trade study.
 
-    `asked` contains the values, as texts `KEY=VALUES` or as a mapping of keys to values. Unusable missions are
+    `asked` contains the values, as strings `KEY=VALUES` or as a mapping of keys to values. Unusable missions are
     returned unchanged.
 
     Raises
@@ -349,7 +355,7 @@ def _of(
 ) -> Answer:
     """Call the function `ask` with the arguments, and return its result.
 
-    If the function raises `QuestionError`, the name of the file of `mission` is put before the message.
+    If the function raises `QuestionError`, the message is prefixed with the file name of `mission`.
     """
     try:
         return ask(*arguments, **options)

@@ -85,7 +85,7 @@ def verify_all(
 
 
 def faster(jobs: int | None = None) -> str:
-    """Phrase with advice on how to form images faster on this machine; empty if there is no advice.
+    """Advice, as a phrase, on how to form images faster on this machine; empty if there is no advice.
 
     The phrase begins with a comma, so that it can follow a sentence.
     """
@@ -95,12 +95,12 @@ def faster(jobs: int | None = None) -> str:
 
 
 def standing(targets: str | None) -> Targets:
-    """Read the targets of a simulation from a text; None gives one point at the centre of the scene.
+    """Parse the targets of a simulation from a string; None gives a single point at the scene centre.
 
     Raises
     ------
     QuestionError
-        The text does not describe valid targets; the message begins with `--targets`.
+        The string does not describe valid targets; the message begins with `--targets`.
     """
     try:
         return Targets() if targets is None else parse_targets(targets)

@@ -1,4 +1,4 @@
-"""Functions that read missions from files and texts, and that make the cases of sweeps."""
+"""Functions that read missions from files or strings, and functions that make the cases of sweeps."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -40,19 +40,19 @@ def load(path: str | os.PathLike[str]) -> Mission:
 
 
 def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
-    """Read a mission from a text.
+    """Read a mission from a string.
 
     Parameters
     ----------
     text : str or bytes
         Content of a mission file.
     file : str
-        File name of the mission for messages. Names of files in the text are relative to the folder of this file.
+        File name to use in messages. Relative file names in the mission refer to the folder of this file.
 
     Raises
     ------
     MissionError
-        The text cannot be used; the attribute `faults` of the exception lists every fault with its line.
+        The mission cannot be used; the attribute `faults` of the exception lists every fault with its line.
     """
     return parse_mission(text, file)
 
@@ -61,7 +61,8 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
 class Spaced:
     """Range of evenly spaced values for a key of a sweep, made by `linspace` or `geomspace`.
 
-    `start` and `stop` are texts with a unit. If `is_log`, successive values have equal ratios, not equal differences.
+    `start` and `stop` are strings with a unit. If `is_log`, successive values have equal ratios instead of equal
+    differences.
     """
 
     start: str
@@ -80,7 +81,7 @@ def linspace(start: object, stop: object, count: int) -> Spaced:
     Parameters
     ----------
     start, stop : str, float or quantity
-        Texts with a unit, such as `"1 s"`, or numbers in SI.
+        Strings with a unit, such as `"1 s"`, or numbers in SI.
     count : int
         Number of values, at least 2.
     """
@@ -105,16 +106,17 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
     mission : Mission
         The loaded mission.
     values : mapping or path
-        Values by key. The values of one key are a range of `linspace`, an array of numbers in SI, a quantity with an
-        array, or a list of texts. Each text is a number with its unit, or a word. Alternatively `values` is the path
-        of a CSV file, whose header has `KEY [unit]` for each column.
+        Values by key. The values of a key are a range made by `linspace` or `geomspace`, an array of numbers in SI, a
+        quantity with an array, or a list of strings. Each string is a number with its unit, or a name. Alternatively
+        `values` is the path of a CSV file, whose header has `KEY [unit]` for each column.
     paired : bool
-        Whether each case takes one value of every key, instead of every combination.
+        If true, the n-th case takes the n-th value of every key. By default every combination of the values is a
+        case.
 
     Raises
     ------
     QuestionError
-        A key is unknown or takes neither a number nor a word, a key has no values, or paired keys have different
+        A key is unknown or accepts neither a number nor a name, a key has no values, or paired keys have different
         numbers of values. A faulty CSV file raises the subclass `TableError`, whose `lines` have one line per fault.
     """
     if not isinstance(values, Mapping):
@@ -137,7 +139,7 @@ def grid_of(mission: Mission, values: Mapping[str, object]) -> Cases:
 
 
 def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
-    """Make the cases of a sweep from texts such as `collection.aperture_time=1:5s:101`.
+    """Make the cases of a sweep from strings such as `collection.aperture_time=1:5s:101`.
 
     There is a case for every combination of the values. If `sample`, the value of the option `--sample`, is given,
     the cases are a random sample of the ranges instead.

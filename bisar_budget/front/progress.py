@@ -97,7 +97,7 @@ def watched_checks(name: str) -> "Iterator[Progress]":
 
 
 def lasting(seconds: float) -> str:
-    """Convert a duration in seconds to a text with a suitable unit, such as `3 minutes`."""
+    """Format a duration in seconds with a suitable unit, such as `3 minutes`."""
     for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -107,7 +107,7 @@ def lasting(seconds: float) -> str:
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
     """Tell the user how long a computation will take, if this is more than a minute.
 
-    `seconds` is the estimated time, `doing` names the computation, and `advice` says how it would be faster.
+    `seconds` is the estimated time, `doing` names the computation, and `advice` tells how to speed it up.
     """
     if seconds > MIN_ANNOUNCED_S:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
@@ -116,8 +116,8 @@ def foretell(seconds: float, doing: str, advice: str = "") -> None:
 def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
     """Estimate the time to process `count` items from trials with fewer items. [s]
 
-    `trial` processes as many items as its argument says, and returns the time that it took [s]. The number of items
-    grows from trial to trial, from `few` up to about `most`, until a trial takes long enough to be measured.
+    `trial` processes the given number of items, and returns the elapsed time [s]. The number of items increases from
+    trial to trial, from `few` up to about `most`, until a trial takes long enough to be measured.
     """
     trial(few)  # imports modules and fills caches
     tried, seconds = few, trial(few)
@@ -144,7 +144,10 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
 
 
 def hold_to_tables() -> None:
-    """Raise an error if a library is missing that `--resume` needs to store the checked parts of a sweep in files."""
+    """Raise an error if a library that `--resume` needs is missing.
+
+    The library stores the checked parts of a sweep in files.
+    """
     from bisar_budget.cluster.parts_folder import check_libraries
 
     check_libraries("--resume", TABLES_MEMORY_BYTES, "tables", "pyarrow")

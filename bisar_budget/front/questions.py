@@ -69,11 +69,12 @@ def sweep(
         As in `check`.
     values : mapping, path or cases
         Values by the path of a key, such as `collection.aperture_time`. Values are a range such as
-        `linspace("1 s", "5 s", 101)`, an array of numbers in SI, a quantity with an array, a list of texts with
-        units, or a list of words such as parts of the catalogue. Alternatively `values` is the path of a CSV file,
+        `linspace("1 s", "5 s", 101)`, an array of numbers in SI, a quantity with an array, a list of strings with
+        units, or a list of names, such as parts of the catalogue. Alternatively `values` is the path of a CSV file,
         whose header has `KEY [unit]` for each column.
     paired : bool
-        Whether each case takes one value of every key, instead of every combination.
+        If true, the n-th case takes the n-th value of every key. By default every combination of the values is a
+        case.
     columns : str or sequence of str
         Further columns of the form `ROW.FIELD`, such as `receiver.velocity.x.allowable`.
     model, date, outside
@@ -119,13 +120,13 @@ def solve(
         Range of the search, such as `("0.2 s", "20 s")`. The default is a tenth to ten times the value of the file,
         and the full circle for an azimuth.
     scale : bool
-        Whether to solve for a factor that multiplies all errors of a section. `key` is then the path of the section.
+        Whether to solve for a factor that multiplies all errors of a section; `key` is then the path of the section.
     row : str, optional
         Id of a row. If given, this row alone has to comply, instead of the whole mission.
     target : str
         With `fail`, a mission complies if nothing fails. With `warn`, it must have no warnings either.
     verify : bool
-        Whether to form images with the binding row at the solution, and add their verdict.
+        Whether to form images at the solution, to verify the binding row, and add their verdict.
     model, date, outside
         As in `check`.
 
@@ -170,7 +171,7 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
 
 
 def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """Form images with the binding row at the solution, and return the solution with the verdict of the images.
+    """Form images at the solution to verify the binding row, and return the solution with their verdict.
 
     If there is no row to image, the solution is returned unchanged.
     """
@@ -225,7 +226,7 @@ def allocate(
         Keys of the errors to specify, or positive weights by key; by default `allocation.specify` of the file, or
         else the usual keys.
     reserve : float, optional
-        Fraction of every limit that is kept free, 0 to 1; by default the fraction above `allocation.warn_above`.
+        Fraction of every limit to keep free, 0 to 1; by default 1 minus `allocation.warn_above`.
     offer : Mission, optional
         Mission of a supplier, whose declared errors are compared with the specifications.
     model, date, outside
@@ -281,21 +282,21 @@ def passes(
     mission : Mission or path
         A mission with an orbit. A file needs no `collection.center_time`.
     start : str or date, optional
-        First day of UTC, or an instant such as `2026-07-01T05:30:00Z`; by default the day of the check.
+        First day (UTC), or an instant such as `2026-07-01T05:30:00Z`; by default the day of the check.
     days : float
         Length of the period that is searched for passes. [d]
     min_elevation, squint : str, float or quantity
-        Least elevation of the satellite as seen from the scene, and squint angle at the mid-time of the aperture.
-        Either is a text with a unit, or a number in radians.
+        Minimum elevation of the satellite as seen from the scene, and squint angle at the mid-time of the aperture.
+        Each is a string with a unit, or a number in radians.
     platform : str, optional
-        Platform that is the satellite, `transmitter` or `receiver`; by default the first with an orbit.
+        Which platform is the satellite, `transmitter` or `receiver`; by default the first platform with an orbit.
     model, date, outside
         As in `check`.
 
     Raises
     ------
     QuestionError
-        The passes cannot be found, such as for a mission without an orbit; the message says why.
+        The passes cannot be found, for example because the mission has no orbit; the message says why.
     """
     from bisar_budget.design.passes import passes as find_passes
     from bisar_budget.design.passes import start_of

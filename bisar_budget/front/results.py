@@ -59,7 +59,7 @@ def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataF
     Raises
     ------
     MissingPackageError
-        The library is not installed, or neither of the two is.
+        The requested library is not installed, or, if none is requested, neither library is.
     """
     libraries = (library,) if library else ("pandas", "polars")
     for name in libraries:
@@ -187,12 +187,12 @@ class CheckResult(Mapping[str, Row]):
         return document
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The rows as a data frame of pandas or polars; numbers are in SI and radians.
+        """Return the rows as a data frame of pandas or polars; numbers are in SI and radians.
 
         Raises
         ------
         MissingPackageError
-            The library is not installed, or neither of the two is.
+            The requested library is not installed, or, if none is requested, neither library is.
         """
         (mission,) = self.to_dict()["missions"]
         rows = [{key: value for key, value in row.items() if key not in _NESTED} for row in mission["rows"]]
@@ -249,13 +249,13 @@ _NESTED = ("displacement_m", "notes", "requirement_ids")  # fields of a row that
 
 # ---------------------------------------------------------------------- answers to other questions
 class AnswerResult:
-    """Base class of results: an answer of the command `COMMAND` that converts to each of its formats."""
+    """Base class of results that can be written in every output format of the command `COMMAND`."""
 
     COMMAND: ClassVar[str] = ""
 
     @property
     def answers(self) -> Sequence[object]:
-        """The answer in the form that the module of `report.answers` takes."""
+        """The answer in the form that the command's module in `report.answers` accepts."""
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
@@ -276,7 +276,7 @@ class AnswerResult:
         Raises
         ------
         MissingPackageError
-            The library is not installed, or neither of the two is.
+            The requested library is not installed, or, if none is requested, neither library is.
         """
         records = records_of(self.COMMAND, self.answers)
         return frame_of({name: records.column(name) for name in records.columns}, library)
@@ -289,7 +289,7 @@ class AnswerResult:
         Raises
         ------
         ValueError
-            The suffix belongs to no format of the answer.
+            The suffix does not belong to any format of the answer.
         MissingExtraError
             The format needs a package that is not installed.
         """
@@ -320,7 +320,7 @@ class _Found(AnswerResult):
 
     @property
     def answers(self) -> Sequence[object]:
-        """The findings, as the only answer."""
+        """The findings, as a sequence of a single answer."""
         return [self.found]
 
 
@@ -396,7 +396,7 @@ class AllocateResult(_Found):
 
     @property
     def answers(self) -> Sequence[object]:
-        """The sheet and the offer, as the only answer."""
+        """The specification sheet and the offer, as a sequence of a single answer."""
         return [(self.found, self.offer)]
 
 
@@ -426,7 +426,7 @@ class PassesResult(_Found):
     model: str | None = None
 
     def __repr__(self) -> str:
-        """Text on one line with the numbers of all, of complying and of waived passes."""
+        """Text on one line with the total number of passes, and the numbers of complying and waived passes."""
         answer = self.found
         waived = _waived([each.waived_by for each in answer.found if each.status == "waived"])
         return f"<passes of {answer.name!r}: {len(answer.complying)} of {len(answer.found)} comply{waived}>"
@@ -442,7 +442,7 @@ class PassesResult(_Found):
     def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
         """Text of a mission file in which the middle of the aperture is at the mid-time of a pass.
 
-        Names of files in the text are relative to `folder`, where the mission file is to be written.
+        File names in the text are relative to `folder`, to which the mission file is to be written.
         """
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
@@ -465,8 +465,8 @@ class PassesResult(_Found):
 class MonteCarloResult(_Found):
     """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
 
-    `probability` is that of all requirements together, and `requirements` has an entry for each requirement. Every
-    probability has a confidence interval.
+    `probability` is the probability that all requirements are met together, and `requirements` has an entry for each
+    requirement. Every probability has a confidence interval.
     """
 
     COMMAND: ClassVar[str] = "monte_carlo"

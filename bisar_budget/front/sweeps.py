@@ -46,10 +46,10 @@ class SweepResult(AnswerResult):
 
     Each case is `mission` with one set of the values in `cases`, and is a line of the table. Cases are checked when
     their results are first needed. `to_dataframe` and `to_xarray` return the whole table, and `result[name]` returns
-    the column with this name. `more` are the names of columns to add. `statuses` counts the checked cases by status,
-    and `waived_by` has the ids of their waivers. `workers` of a scheduler, if given, check the cases. If `beside` is
-    the path of a file, checked parts of the table are stored in a folder next to this file; if `is_resumed`, a sweep
-    that was interrupted continues with the stored parts.
+    the column with this name. `more` contains the names of further columns. `statuses` counts the checked cases by
+    status, and `waived_by` has the ids of their waivers. If `workers` of a scheduler are given, they check the cases.
+    If `beside` is the path of a file, checked parts of the table are stored in a folder next to this file; if
+    `is_resumed`, a sweep that was interrupted continues with the stored parts.
     """
 
     COMMAND: ClassVar[str] = "sweep"
@@ -79,7 +79,7 @@ class SweepResult(AnswerResult):
 
     # ------------------------------------------------------------------ checking cases
     def foreseen(self) -> float:
-        """Estimate the time to check all cases [s]; 0 if there are so few cases that it does not matter."""
+        """Estimate the time to check all cases [s]; 0 if there are too few cases for an estimate to matter."""
         if self.cases.count <= _MANY_CASES:
             return 0.0
 
@@ -221,7 +221,10 @@ class SweepResult(AnswerResult):
 
     @cached_property
     def columns(self) -> Mapping[str, Values]:
-        """Values (cases,) of each column, by its name; values of a varied key are in the unit of the request."""
+        """Values (cases,) of each column, by column name.
+
+        The values of a varied key are in the unit in which the sweep was requested.
+        """
         table = self._table
         values = [table.values(block) for block in table.swept.parts]
         return {column.name: np.concatenate([block[column.name] for block in values]) for column in table.columns}
@@ -293,7 +296,7 @@ class SweepResult(AnswerResult):
 
     @property
     def answers(self) -> list[SweptCases]:
-        """The checked cases, for the formats that have all of them in memory.
+        """The checked cases, for output formats that need all cases in memory.
 
         Raises
         ------
@@ -325,7 +328,7 @@ class SweepResult(AnswerResult):
         Raises
         ------
         QuestionError
-            More keys vary than a drawing has axes, or `column` is not a column of numbers.
+            Too many keys vary for a drawing, or `column` is not a column of numbers.
         """
         from bisar_budget.report.drawing.figure import drawing_file
 
@@ -360,7 +363,7 @@ def _values(common: tuple[Question, Described, AbstractContextManager[object]], 
 
 
 def percentage(count: int, total: int) -> str:
-    """Write `count` as a percentage of `total`; `0 %` is written only for none, and `100 %` only for all."""
+    """Format `count` as a percentage of `total`; `0 %` only if `count` is 0, `100 %` only if it equals `total`."""
     if count in (0, total):
         return "100 %" if count else "0 %"
     return f"{min(max(100 * count / total, 0.1), 99.9):.3g} %"

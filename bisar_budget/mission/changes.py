@@ -90,7 +90,8 @@ def takes_out(change: SetValue) -> bool:
 def _take_out(tree: Tree, change: SetValue) -> None:
     """Remove the key that an option sets to null from the tree.
 
-    A known key that the file does not have is no fault. An unknown key is a fault, and so is an entry of a list.
+    A known key that is missing from the file is not a fault. An unknown key is a fault, and so is an entry of a
+    list.
     """
     steps = parts_of(change.key)
     container: Content = tree.root
@@ -188,7 +189,7 @@ def _put(container: Content, name: str | int, value: object) -> None:
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
     """Parse the value that an option sets, as if it were in the file; a number of a sweep needs no parsing.
 
-    Faults go to the tree and name the option. The result is `INVALID` for a text that cannot be read.
+    Faults are added to the tree and name the option. Returns `INVALID` for a string that cannot be parsed.
     """
     if isinstance(change, SetNumber):
         return change.value
@@ -312,7 +313,10 @@ def _split(names: list[str]) -> tuple[str, str]:
 
 
 def _spelt_right(steps: Sequence[str]) -> str:
-    """Replace each unknown key of a path by the most similar key of its section; empty if one has no similar key."""
+    """Replace each unknown key of a path by the most similar key of its section.
+
+    Returns an empty string if an unknown key has no similar key.
+    """
     meant: list[str] = []
     section: list[str] = []
     for step in steps:
@@ -352,14 +356,15 @@ ACCEPTED_ERRORS = (
 def is_error(key: str) -> bool:
     """Whether a key states the size of an error, such as `timing_error.quadratic`.
 
-    These are all keys in the sections that declare errors, except for intervals, frequencies and similar numbers.
+    All keys in the sections that declare errors state sizes, except for intervals, frequencies and similar
+    numbers.
     """
     steps = parts_of(key)
     return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
-    """Name of an error as row ids have it: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    """Name of an error as used in row ids: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
     return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error", "registered"))
 
 

@@ -54,7 +54,7 @@ class Covariance(NamedTuple):
     pairs: tuple[str, ...] = ()
 
     def of(self, kind: str) -> Vector:
-        """One sigma of the error of a `kind`, "position" [m] or "velocity" [m/s], along each axis of the frame."""
+        """One-sigma errors of a `kind`, "position" [m] or "velocity" [m/s], along the axes of the frame."""
         first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)

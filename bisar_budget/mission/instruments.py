@@ -1,6 +1,6 @@
 """Sections of a mission file with data-sheet figures: inertial sensors, position noise, oscillators, synchronisation.
 
-Values are in SI units, 1 sigma. A figure is a number that a data sheet states, such as a bias or a phase-noise mask.
+Values are in SI units, 1 sigma. A figure is a value that a data sheet states, such as a bias or a phase-noise mask.
 """
 
 import math
@@ -320,9 +320,9 @@ class Oscillator(NamedTuple):
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Replaced noise figure of a part, if the replacing phase-noise mask states no frequency; otherwise None.
+        """Phase noise of a part that the mission overrides by a mask without a frequency; None without such a mask.
 
-        Such a mask applies at the frequency of the part.
+        The mask applies at the frequency of the part.
         """
         return next((figure for figure in self.overridden if figure.frequency), None)
 

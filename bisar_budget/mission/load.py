@@ -39,7 +39,7 @@ def load_mission(
     Raises
     ------
     MissionError
-        The file cannot be read, or is no usable mission. The error contains every fault.
+        The file cannot be read, or is not a usable mission. The error contains every fault.
     """
     try:
         data = held(path, MAX_BYTES, lambda: _content(path))
@@ -109,7 +109,7 @@ def parse_mission(
     Raises
     ------
     MissionError
-        The content is no usable mission. The error contains every fault.
+        The content is not a usable mission. The error contains every fault.
     """
     return mission_of(read_tree(data, file), data, file, model, read_path, changes, find, is_placed=is_placed)
 
@@ -194,9 +194,9 @@ def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
 
 
 def folder_of(file: str) -> str:
-    """Folder to which the relative file names in a mission file refer; empty for a mission from standard input.
+    """Folder to which relative file names in a mission file refer.
 
-    Empty stands for the current folder.
+    An empty string, returned for a mission from standard input, means the current folder.
     """
     return os.path.dirname(file) if file != "-" else ""
 
@@ -219,7 +219,10 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Add a hint to a fault of the file that names the `--set` options, because without them it may not occur."""
+    """Add a hint to a fault of the file that names the `--set` options.
+
+    Without these options the fault may not occur.
+    """
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )
@@ -236,7 +239,10 @@ class Named:
     def parse(
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
-        """Read a mission that names only these files; arguments and errors are the same as in `mission_of`."""
+        """Parse a mission whose named files are all contained in this object.
+
+        Arguments and errors are the same as in `mission_of`.
+        """
         content_by_name = {part_file.name: (part_file.file, part_file.data) for part_file in self.parts}
         return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, content_by_name.__getitem__)
 

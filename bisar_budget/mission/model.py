@@ -167,7 +167,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require either a table, or UT1 - UTC with both coordinates of the polar motion or none of them."""
+        """Require either a table, or UT1 - UTC, optionally with both coordinates of the polar motion."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -282,7 +282,7 @@ class Requirements(NamedTuple):
 
 
 def id_of_requirement(key: str) -> str:
-    """Id of a requirement by its key, such as `requirement.islr`, in lists that also contain rows."""
+    """Id of the requirement with a given key, such as `requirement.islr`, for lists that also contain rows."""
     return f"requirement.{key}"
 
 
@@ -361,7 +361,7 @@ class Shares(NamedTuple):
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
-        """Share of an owner, such as `receiver`; 1 for the owner `mission`, which has the errors without an owner.
+        """Share of an owner, such as `receiver`; 1 for `mission`, to which errors without an owner are assigned.
 
         A clock without a share of its own has the receiver's share.
         """
@@ -406,7 +406,7 @@ METRIC_SPLITS = Section(MetricSplits)
 
 
 def _form_of_split(value: object) -> Reader[str | Shares | MetricSplits]:
-    """Reader for a value of `allocation.split`: a rule in one word, shares, or a split for each metric."""
+    """Reader for a value of `allocation.split`: the name of a rule, shares, or a split for each metric."""
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
@@ -496,7 +496,7 @@ class PartFile(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    The following fields are no keys of the file.
+    The following fields are not keys of the file.
 
     Attributes
     ----------
@@ -511,7 +511,7 @@ class Mission(NamedTuple):
     parts : tuple of PartFile
         Files of the parts that the mission names.
     taken : tuple of TakenFigure
-        Figures that the mission takes from parts. A file that states these figures itself gives the same mission.
+        Figures that the mission takes from parts. A file that states these figures itself describes the same mission.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -660,7 +660,7 @@ class Mission(NamedTuple):
         return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
-        """Line of a value in the mission file, counted from 1, with the region of the value.
+        """Line number of a value in the mission file, starting at 1, and the region that the value occupies.
 
         If the file does not have the value, the nearest key above it is used, or else the first key of the file. The
         result is None for a mission without a file, and for a value that an option set.
@@ -762,7 +762,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 def mission_schema() -> JsonObject:
     """JSON Schema of a mission file.
 
-    A quantity is a bare number, or text with a unit. Only the tool checks the unit completely.
+    A quantity is a bare number, or a string with a unit. The schema does not check units completely; the tool does.
     """
     definitions: Definitions = {}
     return {

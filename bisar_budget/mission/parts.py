@@ -1,6 +1,6 @@
 """Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and sources.
 
-A figure is a number of a data sheet, such as a bias or a phase-noise mask. Each part has one YAML file. The file is
+A figure is a value from a data sheet, such as a bias or a phase-noise mask. Each part has one YAML file. The file is
 in `specs/sensors/`, in a folder that the settings of a project name, or anywhere if the mission names its path. A
 mission names parts. A figure that the mission states itself overrides the figure of the part.
 """
@@ -210,12 +210,12 @@ class Entry:
 
     @property
     def figures(self) -> Mapping[str, str]:
-        """Figures of the part as the file writes them, in one line of text each, by their keys."""
+        """Map the key of each figure of the part to the figure as written in the file, on one line."""
         return {key: figure_text(self.written[key]) for key in FIGURES[self.part.kind] if key in self.written}
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
-    """Yield all parts in the folders `places` of the catalogue, ordered by kind and name.
+    """Yield all parts in the folders `places` of the catalogue, sorted by kind and name.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def figure_text(value: object) -> str:
 
 
 def read_entry(file: str) -> Entry:
-    """Read the file of a part and check it, including the file name, as a mission that names the part would.
+    """Read the file of a part, and check it and the file name as for a mission that names the part.
 
     `-` is standard input, whose name is not checked.
 
@@ -257,7 +257,7 @@ def read_entry(file: str) -> Entry:
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
-    """Yield a fault if the name of a part's file is such that no mission can name the part by it."""
+    """Yield a fault if no mission can refer to a part by the name of its file."""
     name = os.path.basename(file)
     if not name.endswith(_SUFFIXES):
         accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
@@ -339,8 +339,8 @@ def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
 def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """Yield a problem if all figures of a part are missing or zero.
 
-    `values` has no entry for an invalid figure. There is then no problem here, because the figure is reported
-    elsewhere.
+    `values` has no entry for an invalid figure. No problem is reported in this case, because the invalid figure is
+    reported elsewhere.
     """
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
@@ -376,9 +376,9 @@ def _is_not_zero(figure: object) -> bool:
 
 
 def folders(beside: str, files: Files = DISK) -> list[str]:
-    """Folders in which parts are searched: those in the settings of the project, then the catalogue of this package.
+    """Folders in which to search for parts: the folders in the project settings, then the catalogue of this package.
 
-    The project is that of the folder `beside`; empty stands for the current folder.
+    The project is found from the folder `beside`; an empty string means the current folder.
 
     Raises
     ------
@@ -396,7 +396,10 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """Map the name of each part in the folders `places` to its file; of equal names, the first folder's counts."""
+    """Map the name of each part in the folders `places` to its file.
+
+    If several folders have a part of the same name, the first folder takes precedence.
+    """
     part_file_by_name: dict[str, str] = {}
     for folder in places:
         for file in part_files(folder, files)[:_MAX_FOLDER_FILES]:
@@ -417,8 +420,8 @@ def part_files(folder: str, files: Files = DISK) -> list[str]:
 def finder_of(folder: str, files: Files = DISK) -> Find:
     """Return a function that takes the name of a part in a mission, and returns the path and the content of its file.
 
-    `folder` is that of the mission file. The function raises `PartError` if no part has the name, or if its file
-    cannot be read.
+    `folder` is the folder of the mission file. The function raises `PartError` if no part has the name, or if its
+    file cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
@@ -436,7 +439,7 @@ def find_part(name: str, beside: str) -> Part:
     Raises
     ------
     PartError
-        No part has the name, or the file is no valid part.
+        No part has the name, or the file is not a valid part.
     """
     return _entry(*finder_of(beside)(name)).part
 
@@ -503,9 +506,9 @@ def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None
 
 
 def _stand_in(section: Section[object], value: object) -> SectionValues:
-    """Values of a section with which its parts are checked.
+    """Select the values of a section that are used to check the parts that it names.
 
-    These are all its values if they are valid, and otherwise only the names of its parts.
+    These are all values of the section if they are valid, and otherwise only the names of the parts.
     """
     values = section.each(value)
     if INVALID not in values.values():
@@ -550,7 +553,7 @@ def _with_sensors(
     """Complete a motion error with the figures of the parts that it names; `INVALID` if a problem is reported.
 
     Figures that come from parts are appended to `taken`. If the file states a figure that a part also states, the
-    figure of the file is kept, and the motion error lists that of the part as overridden.
+    figure of the file is kept, and the motion error lists the part's figure as overridden.
     """
     path = (*path, "sensor")
     entries = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
@@ -593,7 +596,9 @@ def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) 
 
 
 def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str:
-    """Key, relative to the platform, that states a figure of a part too; empty if only the part states it.
+    """Key under which the mission itself states a figure of a part; empty if only the part states it.
+
+    The key is relative to the platform.
 
     `stating` is the section in which the mission could state the figure: the motion error itself, or its `imu`.
     """
@@ -613,10 +618,10 @@ def _with_sensor(
     """Complete an oscillator with the figures of the part that it names; returns `INVALID` after a report.
 
     Figures that come from the part are appended to `taken`. If the file states a figure that the part also states,
-    the figure of the file is kept, and the oscillator lists that of the part as overridden. A phase-noise mask is
+    the figure of the file is kept, and the oscillator lists the part's figure as overridden. A phase-noise mask is
     valid only at the frequency at which it was measured. At another frequency, the same decibels would describe a
-    better or a worse oscillator. So, if the noise of the part is a mask, a file that states another frequency also
-    has to state the noise.
+    better or a worse oscillator. If the noise of the part is a mask, a file that states another frequency must
+    therefore also state the noise.
     """
     if oscillator.sensor is None:
         return oscillator

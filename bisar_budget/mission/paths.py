@@ -96,7 +96,7 @@ class _UnusablePathError(Exception):
 def reader_of(folder: str, files: Files = DISK) -> Beside:
     """Return a function that reads a file by its name relative to a folder, and returns its content.
 
-    The function raises `PathFileError` if a file cannot be read, is no regular file, or is larger than 500 MB.
+    The function raises `PathFileError` if a file cannot be read, is not a regular file, or is larger than 500 MB.
     """
 
     def read(name: str) -> bytes:
@@ -180,7 +180,7 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Inva
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
-    """Problem of the file with the Earth's orientation that a mission names; None if it names none or a usable one.
+    """Problem of the Earth-orientation file that a mission names; None if the file is usable or not named.
 
     The file is checked even if no path needs it.
     """
@@ -244,7 +244,7 @@ def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
 def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
     """Add the axes of the `ric` frame (radial, in-track, cross-track) to a path, for a scene on the Earth.
 
-    The path is returned unchanged if these axes are undefined, that is, if there is no motion relative to the stars.
+    The path is returned unchanged if these axes are undefined, that is, if the inertial velocity is zero.
     """
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
@@ -253,7 +253,10 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 
 
 def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
-    """Add to a path how errors of its state grow in free fall, if the path is an orbit or is itself in free fall."""
+    """Add the dynamics of state errors in free fall to a path that is an orbit or is itself in free fall.
+
+    Any other path gets no such dynamics.
+    """
     return replace(state, fall=of_scene(axes) if is_orbit else fall_of(state, axes))
 
 
@@ -343,7 +346,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
 
 
 def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:
-    """Orientation of the Earth at mid-aperture, and the name and SHA-256 of the table that states it.
+    """Orientation of the Earth at mid-aperture, and the name and SHA-256 of the table from which it is read.
 
     The second value is None if no table is used.
     """
@@ -358,9 +361,9 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
 
 
 def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], make: Callable[[], _T]) -> _T:
-    """Value of `key` in a cache; if there is none, it is made by `make` and stored.
+    """Value of `key` in a cache; a missing value is computed by `make` and stored.
 
-    The cache keeps the `most` values that were used last.
+    The cache keeps the `most` most recently used values.
     """
     value = cache.pop(key, None) or make()
     cache[key] = value
@@ -372,7 +375,7 @@ def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...
 def _orbit_path(
     orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
 ) -> FlownPath:
-    """Path over an aperture by interpolation of an orbit, with its doubts and stated accuracy.
+    """Path over an aperture, interpolated from an orbit, with its stated accuracy and warnings about it.
 
     Raises `PathFileError` if the orbit does not cover the aperture or is too uncertain.
     """
@@ -423,7 +426,7 @@ def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name:
 def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
     """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m], because its geometry is unknown.
 
-    Raises `PathFileError`. `doubts`, `remedy` and `name` are texts for its message.
+    Raises `PathFileError`, with `doubts`, `remedy` and `name` in the message.
     """
     if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
         lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
@@ -452,7 +455,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
 def _log_path(
     mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
 ) -> FlownPath:
-    """Path over an aperture by smoothing of a flight log, with its noise, doubts and stated accuracy."""
+    """Path over an aperture, smoothed from a flight log, with the log's noise, stated accuracy and warnings."""
     center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
@@ -523,11 +526,11 @@ def _by_accuracy(
 
 
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
-    """Yield the accuracies of a log around the aperture: the largest stated sigmas, and the largest usual sigma.
+    """Yield the accuracies of a log around the aperture: the largest stated sigmas, and the largest typical sigma.
 
-    If no sigma is stated along an axis, the largest sigma of the other axes is used there. The usual sigma of a fix
-    follows from its quality. It is used for fixes without a complete set of stated sigmas. `near` is the range of the
-    fixes around the aperture.
+    If no sigma is stated along an axis, the largest sigma of the other axes is used for it. The typical sigma of a
+    fix follows from its quality. It is used for fixes without a complete set of stated sigmas. `near` is the range
+    of the fixes around the aperture.
     """
     unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
@@ -548,9 +551,9 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
     """Complete a motion error with the accuracy that the source of a path states.
 
-    The accuracy is turned to the axes of the motion error. An accuracy without a direction is used on each axis,
-    because the error may have any direction. A figure of the mission file is kept, and that of the source is then
-    listed in `overridden`.
+    The accuracy is rotated to the axes of the motion error. An accuracy without a direction is used for each axis,
+    because the error may have any direction. If the mission file also states a figure, it is kept, and the figure of
+    the source is listed in `overridden`.
     """
     if stated.is_typical:
         return error
@@ -587,7 +590,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether any two errors of a covariance matrix are correlated by more than rounding explains."""
+    """Whether any two errors of a covariance matrix have a correlation that exceeds rounding errors."""
     off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
     return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 
@@ -615,10 +618,10 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
-    """Make a `FlownPath` from a fit, with its residuals and doubts.
+    """Make a `FlownPath` from a fit, with the residuals of the fit and warnings about it.
 
-    `words` name the source of the path. `file` and `digest` are the name and the SHA-256 of its file, if there is
-    one.
+    `words` is a phrase that names the source of the path. `file` and `digest` are the name and the SHA-256 of its
+    file, if there is one.
     """
     return FlownPath(
         fitted.state,

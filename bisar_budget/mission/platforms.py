@@ -270,7 +270,7 @@ class _Lines(Reader[tuple[str, ...]]):
         return tuple(value)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of the two lines as text."""
+        """JSON Schema: an array of the two lines as strings."""
         return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
@@ -348,7 +348,7 @@ class _Talker(Text):
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: a text of two capital letters."""
+        """JSON Schema: a string of two capital letters."""
         return {"type": "string", "pattern": f"^{_TALKER}$"}
 
 
@@ -424,7 +424,7 @@ class Way:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Required keys of this way that no other way of stating a path has."""
+        """Required keys that are unique to this way of stating a path."""
         return tuple(key for key in self.keys if key != "speed")
 
 
@@ -487,11 +487,11 @@ class FlownPath(NamedTuple):
     farthest, rms : float, optional
         Largest and root-mean-square residual of the fit. [m]
     samples, stretch : int, float, optional
-        Number of the fitted fixes of a log, and the time that they cover. [s]
+        Number of fixes of a log to which the path is fitted, and the time that they cover. [s]
     doubts : tuple of str
         Warnings about the path, for reports.
     doubt_m, doubt_of : float, str
-        Uncertainty of the path, which is the distance of the true path from it [m], and its cause: the age of
+        Uncertainty of the path as a distance from the true path [m], and the cause of the uncertainty: the age of
         elements, the interpolation of an ephemeris, or the residual of a smoothed log.
     is_doubted : bool
         Whether this uncertainty counts as an error if the mission file declares no position error.
@@ -541,12 +541,12 @@ class FlownPath(NamedTuple):
 
     @property
     def largest_doubt_m(self) -> float:
-        """Largest distance of the true path from this path: `doubt_m`, or the stated accuracy if it is larger. [m]"""
+        """Largest distance between this path and the true path: `doubt_m`, or the stated accuracy if larger. [m]"""
         return max([self.doubt_m, *(accuracy.position_m for accuracy in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Map "accuracy" and "earth_orientation" to the name and SHA-256 of that file; None for an unused file."""
+        """Map "accuracy" and "earth_orientation" to the name and SHA-256 of the file; None if no file is used."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -611,7 +611,7 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """First key of the way in which the file states the path, such as `orbit` or `slant_range`."""
+        """First of the keys with which the file states the path, such as `orbit` or `slant_range`."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
@@ -656,7 +656,7 @@ class Platform(NamedTuple):
 
 
 def _with_fall(state: PlatformState) -> PlatformState:
-    """Add to a path in free fall how errors of its state grow, for a scene without a position on the Earth.
+    """Add the dynamics of state errors to a path in free fall, for a scene without a position on the Earth.
 
     Any other path is returned unchanged.
     """
@@ -668,9 +668,10 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Problem if the path keys that a file gives are not exactly one complete way to state a path; otherwise None.
+    """Problem if the given path keys do not state a path in exactly one complete way; otherwise None.
 
-    `is_fixed` tells whether the speed is 0, and `may_be_fixed` whether the speed is stated with an invalid value.
+    `is_fixed` tells whether the speed is 0, and `may_be_fixed` whether the speed has an invalid value, which may be
+    meant as 0.
     """
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
     known_keys = (*ways[0].keys, *ways[0].optional)

@@ -1,6 +1,6 @@
 """Section of a mission file with the propagation delays that remain after correction.
 
-A leg is the way of the signal between one platform and the scene. Delays are at the zenith; a leg at a low elevation
+A leg is the signal path between one platform and the scene. Delays are at the zenith; a leg at a low elevation
 has a longer delay. Values are in SI units, 1 sigma.
 """
 
@@ -85,7 +85,10 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse delays of both legs beside delays of one leg, missing delays, and an unused correlation time."""
+        """Refuse delays that are stated both jointly for the two legs and separately for a leg.
+
+        Missing delays and an unused correlation time are refused too.
+        """
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
@@ -114,7 +117,7 @@ class Propagation(NamedTuple):
 
     @property
     def is_one_air(self) -> bool:
-        """Whether the file states the delays once for both legs, whose signals then cross the same air."""
+        """Whether the file states the delays once for both legs, so that both signals cross the same air."""
         return self.transmitter is None and self.receiver is None
 
     def content(self, platform: str) -> float | None:
@@ -149,7 +152,7 @@ PROPAGATION = Section(Propagation)
 
 
 def height_of(position: Vectors) -> PerCase:
-    """Height of positions (…) above a sphere with the Earth's mean radius that touches the scene centre. [m]"""
+    """Height of positions (…) above a sphere of the Earth's mean radius through the scene centre. [m]"""
     x, y, z = position
     distance: PerCase = np.sqrt(x * x + y * y + (z + EARTH_RADIUS_M) ** 2)
     return distance - EARTH_RADIUS_M
@@ -174,8 +177,8 @@ def least_elevations(
 ) -> Iterator[tuple[str, str, Floats]]:
     """Yield the smallest elevation during the aperture [deg] for each stated delay of each leg.
 
-    Each item is the platform, the key of the delay, and the elevation. A leg below the ionosphere has 90° for the
-    electron content.
+    Each item is the platform, the key of the delay, and the elevation. For the electron content, the elevation is set
+    to 90° on a leg below the ionosphere.
     """
     for name, path in paths.items():
         leg = propagation.leg(name)

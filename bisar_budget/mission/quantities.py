@@ -1,6 +1,6 @@
-"""Access to the numbers of a mission by their keys: a number with its unit is read from the file, or is replaced.
+"""Read or replace the numbers of a mission, each with its unit, by their keys.
 
-A new value may be a text as in a mission file, a number in SI units, or a quantity of astropy or pint.
+A new value may be a string as in a mission file, a number in SI units, or a quantity of astropy or pint.
 """
 
 import functools
@@ -101,7 +101,7 @@ class Number(NamedTuple):
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Write a value, which is in SI units, in the number's unit with `ANSWER_DIGITS` significant digits.
+        """Format a value, given in SI units, in the number's unit with `ANSWER_DIGITS` significant digits.
 
         The value is rounded up if `is_up` is true, down if it is false, and to the nearest if it is None.
         """
@@ -113,7 +113,7 @@ class Number(NamedTuple):
         return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """Copy of the number with the unit in which the end `B` of a range `A..B` is written.
+        """Copy of the number with the unit of the upper end `B` of a range `A..B`.
 
         The number is unchanged if the file has a value, or if the unit of `B` does not fit its kind of quantity.
         """
@@ -122,9 +122,9 @@ class Number(NamedTuple):
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
-        """Convert a text that the method `text` has written back to a value in SI.
+        """Convert a string written by the method `text` to a value in SI.
 
-        Within rounding, the value is the same as that of the reader of the file.
+        Apart from rounding errors, the value is the same as the reader of the file returns.
         """
         return parse_quantity(text, self.dimension)
 
@@ -132,7 +132,7 @@ class Number(NamedTuple):
 class Choices(NamedTuple):
     """A key with a word instead of a number: a choice, a part of the catalogue, a file, a whole number.
 
-    `value` is the word of the file; None if the file has no value, a list or a section.
+    `value` is the word in the file; None if the file has no value, or has a list or a section.
     """
 
     key: str
@@ -146,7 +146,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> JsonObject:
-    """Content of a mission's file with the values of its `--set` options: texts, lists and mappings."""
+    """Content of a mission's file with the values of its `--set` options, as strings, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: JsonObject = tree.root
@@ -159,11 +159,11 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
     Parameters
     ----------
     tree : dict
-        Content of the file as text.
+        Content of the file, with values as strings.
     key : str
         Path of the key.
     of_all : str
-        Text about other accepted keys, which is added to the message about a key with three numbers.
+        Phrase about other accepted keys, to add to the message about a key with three numbers.
     is_for_each : bool
         Whether the number is meant for each axis. If the file has three values, the largest absolute value is used.
 
@@ -192,11 +192,11 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
 
 
 def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
-    """Description of a key that accepts words, with its present value; None for a key that accepts no word.
+    """Describe a key that accepts words, with its current value; None for a key that does not accept words.
 
-    `text` is the new value. It decides between the forms of a key: the split of a budget may be a rule, which is a
-    word, or shares, and the parts may be one name or a list. Raises `QuestionError` if the key does not exist, or if
-    the file has a list and `text` is a single word.
+    `text` is the new value, which determines the form of a key that has several. For example, the split of a budget
+    may be the name of a rule, or shares; and the parts may be a single name, or a list. Raises `QuestionError` if the
+    key does not exist, or if the file has a list and `text` is a single word.
     """
     reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -212,7 +212,7 @@ def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: object) -> Number:
-    """Make the `Number` of a key from its value in the file; its unit is that of the value, or else the usual unit.
+    """Make the `Number` of a key from its value in the file, in the unit of the value or else in the usual unit.
 
     `value` is None if the file has no value.
     """
@@ -226,9 +226,9 @@ def as_number(key: str, reader: Quantity, value: object) -> Number:
 
 
 def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
-    """Reader of the value of a key, and this value in the file, or None if the file has none.
+    """Return the reader of a key, and the value of the key in the file; the value is None if it is missing.
 
-    The reader may still have several forms (`form_of`). Raises `QuestionError` if the key does not exist.
+    The reader may still accept several forms (`form_of`). Raises `QuestionError` if the key does not exist.
     """
     reader: Reader[object] = MISSION
     value: Content = tree
@@ -272,7 +272,7 @@ class Range(NamedTuple):
     is_circle: bool = False
 
     def places(self, count: int) -> list[float]:
-        """`count` values from end to end of the range, in equal steps or, if `is_log`, in equal ratios."""
+        """Divide the range into `count` values, ends included, evenly spaced or, if `is_log`, with equal ratios."""
         fractions = [index / (count - 1) for index in range(1, count - 1)]
         if self.is_log:
             between = [self.low * (self.high / self.low) ** fraction for fraction in fractions]
@@ -282,17 +282,16 @@ class Range(NamedTuple):
 
 
 def range_of(number: Number, between: str | None) -> Range:
-    """Range in which the value of a number is searched, from a text `A..B`.
+    """Range in which to search for the value of a number, from a string `A..B`.
 
-    If `between` is None, the range depends on the number. It extends by one decade, or by 20 dB for a level, to each
-    side of the value in the file. For a direction, it is the full circle. For an elevation or a latitude, it has all
-    accepted values.
+    If `between` is None, the range extends by one decade, or by 20 dB for a level, to each side of the value in the
+    file. For a direction it is the full circle, and for an elevation or a latitude it covers all accepted values.
 
     Raises
     ------
     QuestionError
-        `between` is no range, is empty, or has values that the key cannot have; or the file has no value around which
-        a range could be chosen.
+        `between` is not a range, is empty, or contains values that the key cannot have; or the file has no value
+        around which a range could be chosen.
     """
     gt, ge, lt, le = number.reader.bounds
     if between is None:
@@ -357,7 +356,7 @@ def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
 
 
 def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
-    """Return a section or value with a new number at the path `steps`; a triple gets it on all three axes."""
+    """Return a section or value with a new number at the path `steps`; a triple is set to it on all three axes."""
     if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
@@ -458,7 +457,7 @@ def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | N
 
 # ---------------------------------------------------------------- specified sizes of errors
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
-    """Return a mission whose `specifications` are numbers of the keys that they limit.
+    """Return a mission in which each entry of `specifications` is parsed as a `Number` of the key that it limits.
 
     Invalid specifications become faults of the tree.
     """
@@ -484,10 +483,10 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> PerCase | None:
-    """Size that a mission states for an error at the key of a number, in SI; None if it states none.
+    """Size in SI that a mission states for the error with the key of `number`; None if no size is stated.
 
-    For a triple, the size is the largest absolute value of the three axes. A stated spectrum has the level 0 dB if
-    the file states no level.
+    For a triple, the size is the largest absolute value of the three axes. For the level of a stated spectrum, the
+    size is 0 dB if the file does not state the level.
     """
     value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
@@ -514,7 +513,7 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
         The mission as loaded.
     values : mapping of str to str, float, sequence, quantity or None
         New values by the paths of their keys in the mission file, such as `collection.aperture_time`. A value is a
-        text as in a file, such as `"8 s"`; a number in SI; a list of three; or a quantity of pint or astropy. None
+        string as in a file, such as `"8 s"`; a number in SI; a list of three; or a quantity of pint or astropy. None
         removes the key.
 
     Raises
@@ -528,7 +527,7 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
 
 
 def _si_of(tree: JsonObject, key: str) -> str:
-    """SI unit of the number, or of the three numbers, that a key has; empty if the key has no number with a unit."""
+    """SI unit of the number or of the three numbers at a key; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
             return number_of(tree, number_key).dimension.si
@@ -538,7 +537,7 @@ def _si_of(tree: JsonObject, key: str) -> str:
 
 
 def text_of(si: str, value: object) -> str:
-    """Text for a mission file from a text, number, truth value, quantity, list of these, or None.
+    """Format a value for a mission file: a string, number, boolean, quantity, list of these, or None.
 
     Numbers are in the SI unit `si`; if it is empty, they are written without a unit. None becomes `null`, which
     removes a key.

@@ -1,7 +1,7 @@
 """Readers of values in a mission file: one reader per kind of value, which also writes the JSON Schema of the kind.
 
 A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`. A
-reader takes a value of the file, which is a text, list or mapping, or for a case of a sweep a number in SI. It
+reader takes a value of the file, which is a string, list or mapping, or a number in SI from a case of a sweep. It
 passes each problem to the function `report`, and then returns `INVALID`.
 
 A validation library would do the same, but its import takes five times as long. The import time matters because users
@@ -64,7 +64,7 @@ _NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappi
 def date_schema(pattern: str) -> JsonObject:
     """JSON Schema of a date or an instant.
 
-    Accepted are a text that fits `pattern`, and a date type, which YAML readers return and JSON does not have.
+    It accepts a string that matches `pattern`, or the date type that YAML readers return and JSON does not have.
     """
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
@@ -75,7 +75,7 @@ class Reader(Generic[T_co]):
     is_word = False
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Return the read value; if `leaf` raises an error, report its problem at `path` and return `INVALID`."""
+        """Return the value converted by `leaf`; if that fails, report the problem at `path` and return `INVALID`."""
         try:
             return self.leaf(value)
         except InvalidValueError as error:
@@ -83,7 +83,7 @@ class Reader(Generic[T_co]):
             return INVALID
 
     def leaf(self, value: object) -> T_co:
-        """Return the read value; raises `InvalidValueError` for an invalid value."""
+        """Convert a value of the file; raises `InvalidValueError` if the value is invalid."""
         raise NotImplementedError
 
     def below(self, step: str) -> "Reader[object] | None":
@@ -106,8 +106,8 @@ class Quantity(Reader[float]):
     """A number with a unit, within bounds; read as a float in SI. Decibels stay decibels.
 
     `dimension` is the kind of quantity with its units. The bounds are in SI: greater than `gt`, at least `ge`, less
-    than `lt`, at most `le`. They keep every later square and quotient finite, and no real value comes near the outer
-    ones.
+    than `lt`, at most `le`. The bounds keep all later squares and quotients finite; realistic values are far from the
+    widest bounds.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Quantity(Reader[float]):
         self.bounds = (gt, ge, lt, le)
 
     def leaf(self, value: object) -> float:
-        """Read a number with its unit from a text, or take a float in SI, and check that it is within the bounds."""
+        """Read a number with its unit from a string, or accept a float in SI, and check it against the bounds."""
         if type(value) is float and math.isfinite(value):
             number = value
         else:
@@ -147,11 +147,14 @@ class Quantity(Reader[float]):
         raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
     def _text(self, value: object) -> object:
-        """Text of a float in SI as a mission file would write it; any other value is returned unchanged."""
+        """Format a float in SI as in a mission file; any other value is returned unchanged."""
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
     def _unit_hint(self, value: object) -> str:
-        """Hint that names the unit of a bare number, for a file that forgot it; empty if no unit can be missing."""
+        """Hint that tells how a bare number is interpreted, in case its unit was forgotten.
+
+        The hint is empty if the value is not a bare number, or if the number cannot lack a unit.
+        """
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
@@ -162,9 +165,9 @@ class Quantity(Reader[float]):
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: text with a unit, or a bare number within the bounds.
+        """JSON Schema: a string with a unit, or a bare number within the bounds.
 
-        If the quantity needs a unit, as an angle does, the only bare number is zero.
+        If the quantity needs a unit, as an angle does, zero is the only accepted bare number.
         """
         name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
         if name not in definitions:
@@ -178,7 +181,7 @@ class Quantity(Reader[float]):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> JsonObject:
-        """JSON Schema that refuses zero, positive or negative numbers in any unit, if the bounds exclude these."""
+        """JSON Schema that refuses zero, positive or negative numbers in any unit, if the bounds exclude them."""
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
             return {}
@@ -198,9 +201,9 @@ _UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spelling
 
 
 def _quantity_schema(dimension: Dimension) -> JsonObject:
-    """JSON Schema of a kind of quantity: a number, or text of a number without a unit of another kind.
+    """JSON Schema of a kind of quantity: a number, or a string with a number whose unit is not of another kind.
 
-    If the kind needs a unit, the only bare number is zero.
+    If the kind needs a unit, zero is the only accepted bare number.
     """
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
     all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
@@ -239,11 +242,11 @@ class Triple(Reader[tuple[float, ...]]):
         return components if are_valid(components) else INVALID
 
     def _bracketed(self, value: object) -> str:
-        """Hint to put brackets around three values in a text; empty if the text is not three values.
+        """Hint to put brackets around three values in a string; empty if the string does not have three values.
 
-        The hint has the corrected text if each of the three values has a unit or is 0. Otherwise it only asks for
-        brackets and units, if blanks follow the commas. The reason is that `1,234,567 m` may be one number, and `1,
-        2, 3 km` is not three lengths.
+        If each of the three values has a unit or is 0, the hint contains the corrected string. Otherwise, if blanks
+        follow the commas, it only asks for brackets and units, since `1, 2, 3 km` is not three lengths. Without
+        blanks there is no hint, since `1,234,567 m` may be a single number.
         """
         if not isinstance(value, str):
             return ""
@@ -261,7 +264,7 @@ class Triple(Reader[tuple[float, ...]]):
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one component; None if `step` is no index."""
+        """Reader of one component; None if `step` is not an index."""
         return self.component if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -277,7 +280,7 @@ class Text(Reader[str]):
     name, max_characters = "Text", _MAX_TEXT_CHARACTERS
 
     def leaf(self, value: object) -> str:
-        """Return the text; refuse a text that is empty, too long or not printable.
+        """Return the string; refuse a string that is empty, too long or not printable.
 
         Control characters could change a terminal or a report.
         """
@@ -292,7 +295,7 @@ class Text(Reader[str]):
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema that accepts any single value, because YAML readers of other tools convert some texts.
+        """JSON Schema that accepts any single value, because YAML readers of other tools convert some strings.
 
         They read 007 as a number, `yes` as true, and 2026-06-01 as a date.
         """
@@ -320,7 +323,10 @@ class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
     def leaf(self, value: object) -> str:
-        """Return the pattern; refuse more than `_MAX_WILDCARD_COUNT` wildcards, because matching would take long."""
+        """Return the pattern; refuse more than `_MAX_WILDCARD_COUNT` wildcards.
+
+        With more wildcards, matching would take too long.
+        """
         pattern = super().leaf(value)
         if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
             raise InvalidValueError(f"must have at most {_MAX_WILDCARD_COUNT} wildcards")
@@ -367,7 +373,7 @@ class YesNo(Reader[bool]):
         return boolean
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: a boolean, or true or false as text."""
+        """JSON Schema: a boolean, or true or false as a string."""
         return {"enum": [True, False, *_YES_NO]}
 
 
@@ -407,11 +413,11 @@ class TextList(Words):
         self.fewest, self.most = 1, most
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one name in the list; None if `step` is no index."""
+        """Reader of one name in the list; None if `step` is not an index."""
         return self.word if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of at least one text."""
+        """JSON Schema: an array of at least one string."""
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
@@ -510,14 +516,14 @@ class TextMap(Reader[dict[str, str]]):
         self.of, self.text = of, text or Text()
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, str] | Invalid:
-        """Read the text of each key; a problem with a text is reported at the path of its key."""
+        """Read the string at each key; a problem with a string is reported at the path of its key."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
         result = {key: read_part(self.text, text, (*path, key), report) for key, text in value.items()}
         return result if has_valid_values(result) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object with any keys and with texts as values."""
+        """JSON Schema: an object with arbitrary keys and strings as values."""
         return {
             "type": "object",
             "additionalProperties": self.text.schema(definitions),
@@ -545,7 +551,7 @@ class IdMap(Reader[dict[str, tuple[str, ...]]]):
         return INVALID if text is INVALID else (text,)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object with any keys, and with texts or arrays of texts as values."""
+        """JSON Schema: an object with arbitrary keys, and with strings or arrays of strings as values."""
         ids = {"anyOf": [self.text.schema(definitions), self.texts.schema(definitions)]}
         return {"type": "object", "additionalProperties": ids, "maxProperties": _MAX_ID_COUNT}
 
@@ -554,7 +560,7 @@ class SizeMap(Reader[dict[str, object]]):
     """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
-        """Return the mapping with its sizes unconverted; refuse sizes that are lists or mappings."""
+        """Return the mapping without converting its sizes; refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
         nested = [key for key, size in value.items() if isinstance(size, dict | list)]
@@ -563,7 +569,7 @@ class SizeMap(Reader[dict[str, object]]):
         return INVALID if nested or INVALID in value.values() else value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object with any keys and with texts or numbers as sizes."""
+        """JSON Schema: an object with arbitrary keys, whose values are error sizes given as strings or numbers."""
         size = {"type": ["string", "number"]}
         return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
@@ -651,8 +657,8 @@ class Section(Reader[T_co]):
     The function `problems(values)` of a `NamedTuple` yields contradictions between the values of its section. It gets
     the valid values together with the defaults, so that a fault in one value does not hide a contradiction between
     two valid values. An optional section or list that is valid and empty counts as absent. If the `NamedTuple` has a
-    function `any_of()`, the section needs at least one of the keys that it lists; `problems` and the schema check
-    this.
+    function `any_of()`, the section must have at least one of the keys that this function returns; `problems` and the
+    schema check this.
     """
 
     def __init__(self, kind: Callable[..., T_co]) -> None:
@@ -701,7 +707,7 @@ class Section(Reader[T_co]):
         return self.kind(**values) if is_valid else INVALID
 
     def each(self, value: object) -> dict[str, object]:
-        """Read the value of each known key on its own, without reports; an invalid value becomes `INVALID`."""
+        """Read the value of each known key separately and without reports; invalid values become `INVALID`."""
         items = value.items() if isinstance(value, dict) else ()
         return {
             name: read_part(self.keys[name].reader, item, (), _ignore_problem)
@@ -762,7 +768,7 @@ class ListOf(Reader[tuple[T_co, ...]]):
         return entries if are_valid(entries) else INVALID
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one entry of the list; None if `step` is no index."""
+        """Reader of one entry of the list; None if `step` is not an index."""
         return self.section if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -799,10 +805,10 @@ class PointsReader(Reader[T_co]):
         self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
 
     def points(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read the points of a curve, and return them in rising order of the abscissas.
+        """Read the points of a curve, and return them sorted by ascending abscissa.
 
-        A problem with a point is reported at the path of its abscissa. The points are `SortedPoints` if the file has
-        them in another order.
+        A problem with a point is reported at the path of its abscissa. The result is a `SortedPoints` if the points
+        are not in ascending order in the file.
         """
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
             length_words = f", {len(value)} given" if isinstance(value, dict) else ""
@@ -831,7 +837,7 @@ class PointsReader(Reader[T_co]):
         return tuple(sorted_points) if sorted_points == list(points.items()) else SortedPoints(sorted_points)
 
     def below(self, part: str) -> Reader[object] | None:
-        """Reader of the ordinate at an abscissa; all points have the same."""
+        """Reader of the ordinates, which is the same for all points."""
         return self.ordinate
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -848,7 +854,7 @@ class CurveReader(PointsReader[Points]):
     """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read all points of the curve in rising order; a problem is reported at the path of its point."""
+        """Read all points of the curve, sorted by ascending abscissa; a problem is reported at its point."""
         return self.points(value, path, report)
 
 
@@ -868,7 +874,7 @@ def is_empty(item: object) -> bool:
 
 
 def is_index(step: str) -> bool:
-    """Whether a step of a path has only digits, so that it is an index in a list."""
+    """Whether a component of a path consists only of digits, which makes it an index of a list."""
     return step.isascii() and step.isdigit() and len(step) < 9
 
 
@@ -888,11 +894,11 @@ def has_valid_values(mapping: Mapping[K, T | Invalid]) -> TypeGuard[dict[K, T]]:
 
 
 def _ignore_problem(path: KeyPath, problem: Problem) -> None:
-    """Do nothing with a problem, because it is reported elsewhere."""
+    """Ignore a problem, because it is reported elsewhere."""
 
 
 def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
-    """Hint that names the known word nearest to an unknown word; empty if no known word is similar."""
+    """Hint with the known word most similar to an unknown word; empty if no known word is similar."""
     from difflib import get_close_matches
 
     near = get_close_matches(str(word)[:_MAX_TEXT_CHARACTERS], known_words, 1)

@@ -102,12 +102,12 @@ class _Faults:
         self.faults: list[Fault] = []
 
     def at(self, cell: Cell, column: str, problem: str, accepted: str = "", hint: str = "", value: str = "") -> None:
-        """Record a fault of a cell, whose content is the given value."""
+        """Record a fault in a cell; `value` is the faulty content, by default the text of the cell."""
         value = value or shown(cell.text)
         self.faults.append(Fault(cell.line, cell.column, column, problem, value, accepted, hint))
 
     def of(self, cell: Cell, column: str) -> Callable[[KeyPath, Problem], None]:
-        """Function that records a problem that a reader reports for a cell."""
+        """Return a function that records the problems reported by the reader of a cell as faults of the cell."""
         return lambda _, problem: self.at(cell, column, problem.problem, problem.accepted, problem.hint)
 
 
@@ -118,7 +118,7 @@ def read_requirement_lines(data: bytes, file: str) -> tuple[RequirementEntry, ..
     Raises
     ------
     MissionError
-        The content is no requirements file. The error contains every fault with its line and column.
+        The content is not a valid requirements file. The error contains every fault with its line and column.
     """
     if len(data) > MAX_BYTES:
         raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no requirements file"),))
@@ -146,7 +146,7 @@ def read_requirement_lines(data: bytes, file: str) -> tuple[RequirementEntry, ..
 
 
 def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
-    """Indices of the columns by name; further columns are not used, except for a confidence."""
+    """Indices of the known columns and of a confidence column, by name; all other columns are ignored."""
     names = [cell.text.lower() for cell in header]
     for name in (*COLUMNS, _CONFIDENCE):
         if names.count(name) > 1:
@@ -206,19 +206,19 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
 
 
 def _without_apostrophe(cell: Cell) -> Cell:
-    """Cell without an apostrophe that keeps a spreadsheet from reading it as a formula, such as `'-30 dB`."""
+    """Remove the apostrophe that protects text from being read as a formula by a spreadsheet, as in `'-30 dB`."""
     return cell._replace(text=cell.text[1:]) if re.match("'[-+=@]", cell.text) else cell
 
 
 def _written(line: RequirementEntry) -> str | list[str]:
-    """Limit of a line as a mission file writes it: a text, or for `declare` a list of words."""
+    """Limit of a line in the form that it has in a mission file: a string, or a list of strings for `declare`."""
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text
 
 
 def _limit(line: RequirementEntry) -> object:
-    """Limit of a line in SI units, as the reader of its key gives it."""
+    """Limit of a line in SI units, converted by the reader of its key."""
     return _LIMITS[line.key.text].read(_written(line), (), lambda path, problem: None)
 
 
@@ -241,8 +241,8 @@ def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
 def add_requirements(tree: Tree, read: Callable[[str], bytes], changes: Sequence[SetValue]) -> None:
     """Put the values of the requirements file that a mission names into the tree of the mission file.
 
-    A value of an option replaces that of the file. Faults become faults of the tree, at the name of the file. `read`
-    takes the name of the file and returns its content, or raises `PathFileError`.
+    Values set by options take precedence over values of the requirements file. Faults are recorded in the tree, at
+    the name of the file. `read` takes the name of the file and returns its content, or raises `PathFileError`.
     """
     requirements = tree.root.get("requirements")
     name = requirements.get("file") if isinstance(requirements, dict) else None
@@ -285,7 +285,7 @@ class _Into:
             self._text(line)
 
     def _section(self, name: str) -> dict[str, object] | None:
-        """Section of the tree, which is added if it is missing; None if it is no mapping, as its reader reports."""
+        """Section of the tree, added if it is missing; None if it is not a mapping, which its reader reports."""
         section = self.tree.root.setdefault(name, {})
         self.tree.values.setdefault((name,), self.event)
         return section if isinstance(section, dict) else None
@@ -336,14 +336,14 @@ class _Into:
             self._put(path, line.text.text)
 
     def _put(self, path: KeyPath, text: str) -> None:
-        """Give a value the position of the file's name in the mission file, and its own text."""
+        """Record the text of a value, at the position where the mission file names the requirements file."""
         event = self.event
         if not isinstance(event, Changed):
             event = ScalarEvent(None, None, (True, False), text, event.start_mark, event.end_mark)
         self.tree.values[path] = event
 
     def hold_to_limit(self, line: RequirementEntry) -> None:
-        """Report a requirement of the file for which neither the file nor the mission states a limit."""
+        """Report a requirement in the file if neither the file nor the mission states a limit for it."""
         key = line.key.text
         is_stated = key in self.tree.root["requirements"] or "requirements." + key in self.changed
         if key in _LIMITS and key not in _HAS_DEFAULT and not is_stated:

@@ -26,16 +26,16 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    If the path `near` is in the repository of the current folder, that repository is read. Otherwise it is the
-    repository around the path. So a folder that has become a submodule since the revision is read from the repository
-    around it. Links are followed within the revision. Submodules are read at the commit that the revision names. A
-    file outside of the repository has only one version, which is on the disk; `outside` lists the outside files that
-    were read.
+    If the path `near` is in the repository of the current folder, that repository is read, and otherwise the
+    repository that contains the path. A folder that became a submodule only after the revision is therefore read from
+    the enclosing repository. Links are followed within the revision. Submodules are read at the commit that the
+    revision records. A file outside the repository is read from the disk; `outside` lists all such files that were
+    read.
 
     Parameters
     ----------
     near : str
-        A path within the repository; it need not exist any more.
+        A path within the repository; it need not exist any longer.
     name : str
         Name of the revision: a branch, a tag or a commit.
 
@@ -82,7 +82,7 @@ class Revision:
         raise UnreadableError(f"{called} {_why_not(git_object)} revision {printable(self.name)}", is_missing=True)
 
     def names(self, folder: str) -> list[str]:
-        """Sorted names of the entries of a folder in the revision; raises `OSError` if it has no such folder."""
+        """Sorted names of the entries of a folder in the revision; raises `OSError` if there is no such folder."""
         inside = self._inside(folder)
         if inside is None:
             return DISK.names(folder)
@@ -128,7 +128,7 @@ class Revision:
 
         A submodule or linked folder is entered if the pattern may match files in it. `pattern` is the pattern split
         at slashes, and `tree` is the git object of the folder. `above` is the path of the folder with a slash at its
-        end. `way` has the hashes of the folders above it, so that links do not lead in a circle.
+        end. `way` contains the hashes of the parent folders, so that circular links are detected.
         """
         _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
         files = []
@@ -183,7 +183,7 @@ class Revision:
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a path matches a glob pattern as in `glob.glob`, where `**` stands for any number of folders.
+    """Whether a path matches a glob pattern as in `glob.glob`, where `**` matches any number of folders.
 
     Path and pattern are split at slashes.
     """
@@ -197,15 +197,15 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
 
 
 def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a glob pattern may match files below a folder; both are split at slashes."""
+    """Whether a glob pattern may match files below a folder; pattern and folder are split at slashes."""
     start = pattern[: len(folder)]
     return "**" in start or (len(folder) < len(pattern) and _matches(folder, start))
 
 
 def _top(folder: str) -> tuple[str, str]:
-    """Top folder of the git repository around a folder; empty if there is none.
+    """Top folder of the git repository that contains a folder, and a reason why git refuses to read the repository.
 
-    The second value is the reason if git refuses to read the repository, and otherwise empty.
+    The top folder is empty if there is no repository. The reason is empty if git does not refuse.
     """
     is_found, top, refusal = _git(folder, "rev-parse", "--show-toplevel")
     return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), refusal
@@ -287,7 +287,7 @@ def _existing(path: str) -> tuple[str, str]:
 
 
 def _why_not(git_object: _Object) -> str:
-    """Reason why a git object is no readable file, as text between the name of the file and the revision."""
+    """Reason why a git object cannot be read as a file, worded to go between the file name and the revision."""
     if git_object.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(git_object.content))}, in"
     if git_object.kind == b"submodule":
@@ -307,7 +307,7 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
     RevisionError
         The revision has no such file.
     MissionError
-        The file of the revision is no usable mission.
+        The file in the revision is not a usable mission.
     """
     try:
         data = revision.content(path, MAX_BYTES)
@@ -319,9 +319,9 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
 
 
 def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes, str]:
-    """Run git in a folder; returns whether it succeeded, its output, and a refusal.
+    """Run git in a folder; return whether it succeeded, its output, and the reason for a refusal.
 
-    The refusal is the reason if git does not read the repository because it has another owner, and otherwise empty.
+    The reason is empty, unless git refuses to read the repository because it has another owner.
     """
     # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]

@@ -30,7 +30,7 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
     """Combine missions of the same shape into missions of arrays; yield each with the indices of the missions in it.
 
     Missions have the same shape if they differ only in numbers, not in keys, words or lengths of lists. A number that
-    differs between the missions becomes an array (missions,), and a number that is the same in all of them stays a
+    differs between the missions becomes an array (missions,); a number that is the same in all missions remains a
     number. The combined mission has no sources and no positions in a file, because calculations with arrays never
     read them.
     """
@@ -54,7 +54,7 @@ def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
 
 
 def _bare(mission: Mission) -> Mission:
-    """Copy of a mission without its name, its file and the sources of its paths, on which no calculation depends."""
+    """Copy of a mission without its name, file and path sources, which do not affect any calculation."""
     for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
@@ -74,7 +74,7 @@ def _bare(mission: Mission) -> Mission:
 
 
 def _children(value: SectionValue) -> tuple[object, ...] | None:
-    """Values that a section, list or mapping contains; None for a number, an array or a word, which contain none."""
+    """Values in a section, list or mapping; None for a leaf, which is a number, an array or a word."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, dict):
@@ -83,7 +83,7 @@ def _children(value: SectionValue) -> tuple[object, ...] | None:
 
 
 def _shape(value: SectionValue, numbers: list[float]) -> object:
-    """Shape of a value: all that it contains except its numbers, which are appended to `numbers` in their order."""
+    """Shape of a value: its whole content without the numbers, which are appended to `numbers` in order."""
     if isinstance(value, float):
         numbers.append(value)
         return float
@@ -95,7 +95,7 @@ def _shape(value: SectionValue, numbers: list[float]) -> object:
 
 
 def _with_leaves(value: SectionValue, put: Callable[[object], object]) -> SectionValue:
-    """Copy of a value in which each number, array or word is replaced by the result of `put` for it."""
+    """Copy of a value in which each leaf (number, array or word) is replaced by `put(leaf)`."""
     children = _children(value)
     if children is None:
         return put(value)

@@ -1,7 +1,7 @@
 """YAML as a plain tree with positions: the content of a file before its keys and values are interpreted.
 
 The tree is built from the events of the YAML parser, so that its depth is limited before any recursion. Every scalar
-stays the text of the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
+is kept as written in the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
 """
 
 import re
@@ -94,7 +94,7 @@ class Tree:
         return tree
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
-        """Record a fault at a mark, which is a position in the file; without a mark it is at the start of the file.
+        """Record a fault at a mark, which is a position in the file; the default is the start of the file.
 
         If an option set the value at `path`, the fault names the option and has no line. `details` are further fields
         of the fault. Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
@@ -117,13 +117,13 @@ class Tree:
         return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
-        """All faults in the order of the file, without repetitions."""
+        """All distinct faults, sorted by their position in the file."""
         return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
         """Record a problem that a reader reports as a fault.
 
-        Its position is that of the value or key at `path`, or else of the nearest key above it.
+        The fault is located at the value or key at `path`, or at the nearest key above it if the file has neither.
         """
         path = (*path, *problem.at)
         value: Content = self.root
@@ -141,10 +141,10 @@ class Tree:
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def document(self, text: str, path: KeyPath, accepted: str) -> Content:
-        """Read the only YAML document of a text into the tree at a path; returns `INVALID` for an empty text.
+        """Read text that consists of a single YAML document into the tree at a path; return `INVALID` for empty text.
 
-        Raises `UnusableError` for a second document, and `yaml.YAMLError` for a text that is not YAML. `accepted`
-        tells in the message about a second document what is accepted.
+        Raises `UnusableError` for a second document, and `yaml.YAMLError` for text that is not YAML. `accepted`
+        describes the accepted content in the message about a second document.
         """
         next_event: Callable[[], ParserEvent] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
@@ -200,8 +200,8 @@ class Tree:
     def _decimal_commas(self, items: list[ParserEvent], path: KeyPath) -> None:
         """Refuse lists with decimal commas, such as `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`.
 
-        YAML reads these as four and as three values. A comma counts as a decimal comma if no blank follows it, and
-        blanks follow other commas of the list.
+        YAML reads these as four and as three values. A comma counts as a decimal comma if no blank follows it, but
+        blanks follow the other commas in the list.
         """
         commas = []
         for index, (before, item) in enumerate(pairwise(items), start=1):
@@ -282,7 +282,7 @@ _STARTS = {
 
 
 def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
-    """Read a file of one YAML document into a tree; bytes are UTF-8, and `file_kind` is "mission" or "part".
+    """Read a file with a single YAML document into a tree; `file_kind` is "mission" or "part". Bytes must be UTF-8.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def _copied(value: Content) -> Content:
 
 
 def _dotted(path: KeyPath) -> str:
-    """Write a path as text, such as `other_errors[0].name`; a text of more than 200 characters is shortened."""
+    """Format a path, such as `other_errors[0].name`; paths of more than 200 characters are shortened."""
     text = ""
     for name in path:
         text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else str(name)

@@ -33,14 +33,14 @@ class StatedAccuracy(NamedTuple):
     Attributes
     ----------
     words : str
-        Description of the statement for reports.
+        Description of the stated accuracy for reports.
     covariance : (3, 3) or (6, 6), optional
         Covariance of position [m²], or of position and velocity [m², m²/s, m²/s²], along Earth-fixed axes or
         along the axes of a scene.
     total : float
         Total position error, if the source states only its size and no covariance. [m]
     is_typical : bool
-        True if the source states only a quality of its fixes. The error is then the usual error for this quality.
+        True if the source states only the quality of its fixes. The error is then a typical error for this quality.
     """
 
     words: str
@@ -60,9 +60,9 @@ class StatedAccuracy(NamedTuple):
 class PathNoise(NamedTuple):
     """Error of a path due to the noise of its log, as polynomials of slow time over the aperture.
 
-    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, … [m], [m/s], …. Each mode is a
-    one-sigma error along one axis of the scene, and is independent of all other modes. Terms above order 8 are
-    neglected.
+    `modes` (modes, orders, 3) are the polynomial coefficients, in ascending powers of slow time. [m], [m/s], … Each
+    mode is a one-sigma error along one axis of the scene, and is independent of all other modes. Terms above order 8
+    are neglected.
     """
 
     modes: tuple[tuple[Vector, ...], ...]
@@ -108,8 +108,8 @@ def correlations(covariance: Floats) -> Matrix:
 def covering_sigmas(covariance: Floats) -> Vector:
     """Sigmas (3,) of independent errors along three axes, chosen to cover a covariance (3, 3). [m], [m/s]
 
-    In every direction their variance is at least the variance that the covariance gives. If the covariance is
-    diagonal, these are its own sigmas. Otherwise they are larger by a factor of up to √3.
+    In every direction, their variance is at least that of the covariance. For a diagonal covariance, the result is
+    the square root of its diagonal. Otherwise the sigmas are larger by a factor of up to √3.
     """
     largest = float(np.linalg.eigvalsh(np.array(correlations(covariance)))[-1])
     factor = math.sqrt(largest) if largest > 1 + _EQUAL_VARIANCE_FRACTION else 1.0
@@ -118,7 +118,7 @@ def covering_sigmas(covariance: Floats) -> Vector:
 
 
 def held_to_covariance(values: Floats) -> Floats:
-    """Correct a covariance matrix that is not positive semi-definite only because of rounding errors.
+    """Make a covariance matrix positive semi-definite if it fails to be so only because of rounding errors.
 
     Raises
     ------
@@ -141,13 +141,13 @@ def held_to_covariance(values: Floats) -> Floats:
 def turns_with_orbit(name: str) -> bool:
     """Whether the CCSDS name of orbit axes ends with `_ROTATING`.
 
-    Velocities are then relative to axes that turn with the orbit.
+    Velocities are then relative to axes that rotate with the orbit.
     """
     return name.endswith("_ROTATING")
 
 
 def local_axes(name: str) -> str | None:
-    """Convert the CCSDS name of axes that follow an orbit to `RTN` or `TNW`; None for a name of any other axes."""
+    """Convert the CCSDS name of axes that follow an orbit to `RTN` or `TNW`; None for the name of any other axes."""
     for suffix in _AXES_SUFFIXES:
         name = name.removesuffix(suffix)
     name = _AXES_SYNONYMS.get(name, name)
@@ -160,8 +160,8 @@ class EpochCovariance:
 
     `axes` is the name of the axes: `RTN` or `TNW` for axes of the orbit, `earth` for Earth-fixed axes, or `stars` for
     celestial axes, which `turn` converts to Earth-fixed axes. None means that the axes are unknown. Then only the
-    total position variance is used. With `RTN` or `TNW`, velocities are relative to the stars. If `is_rotating`, they
-    are relative to axes that turn with the orbit instead.
+    total position variance is used. With `RTN` or `TNW`, velocities are inertial, or relative to axes that rotate
+    with the orbit if `is_rotating` is set.
     """
 
     epoch: Instant
@@ -172,7 +172,7 @@ class EpochCovariance:
 
 
 class OrbitState(NamedTuple):
-    """Position [m] of a satellite, and its velocity [m/s] relative to the stars.
+    """Position [m] and inertial velocity [m/s] of a satellite.
 
     Both are components along Earth-fixed axes.
     """
@@ -192,7 +192,7 @@ class OrbitState(NamedTuple):
         return np.array((first, np.cross(across, first), across))
 
     def rate(self, name: str) -> float:
-        """Rate at which the axes `RTN` or `TNW` turn about the orbit's normal, relative to the stars. [rad/s]"""
+        """Inertial rate at which the axes `RTN` or `TNW` rotate about the orbit normal. [rad/s]"""
         position, velocity = np.array(self.position), np.array(self.velocity)
         momentum = float(np.linalg.norm(np.cross(position, velocity)))
         if name == "RTN":
@@ -203,9 +203,9 @@ class OrbitState(NamedTuple):
 
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
-    """Position and velocity on an orbit at an instant, from its Earth-fixed positions.
+    """Position and inertial velocity of a satellite at an instant, from the Earth-fixed positions on its orbit.
 
-    The velocity is a central difference of positions, which all lie within the span of the orbit.
+    The velocity is computed from a central difference of positions within the span of the orbit.
     """
     first = max(instant.after(-_VELOCITY_STEP_S), span[0])
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
@@ -217,7 +217,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 
 
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
-    """Convert a covariance (6, 6) to velocities relative to other axes: δv becomes δv + rate × δr.
+    """Convert the velocities of a covariance (6, 6) to axes with a different rotation: δv becomes δv + rate × δr.
 
     `rate` (3,) is the angular rate of the old axes relative to the new axes. [rad/s]
     """
@@ -240,7 +240,7 @@ def stated_of_orbit(
 
     Between two epochs the covariance is interpolated linearly along the orbit's axes. Before the first and after the
     last epoch, the covariance of the nearest epoch is used. A covariance of zero counts as missing. Returns None if
-    no covariance is stated. `place` is the function from an instant to the Earth-fixed position [m].
+    no covariance is stated. `place` is a function that returns the Earth-fixed position [m] at an instant.
     """
     nonzero = (covariance for covariance in covariances if np.trace(covariance.values[:3, :3]) > 0)
     stated = sorted(nonzero, key=lambda covariance: covariance.epoch)
@@ -271,7 +271,7 @@ def stated_of_orbit(
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
-    """Convert a covariance to radial, in-track and cross-track axes, for velocities relative to the stars."""
+    """Convert a covariance to radial, in-track and cross-track axes, with inertial velocities."""
     if covariance.axes in LOCAL_AXES:
         values = covariance.values
         if covariance.is_rotating:

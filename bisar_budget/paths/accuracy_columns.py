@@ -107,10 +107,10 @@ _COLUMN_SPELLINGS = (
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
     """Find the accuracy that a column states, from its name and unit; return its standard name and unit.
 
-    The standard name is `sigma_east` or `variance_east`, or the same for another axis. It is `horizontal_accuracy`,
-    `vertical_accuracy`, or `position_accuracy` for an accuracy without a direction. It is `sigma_h` if h may be the
-    height or horizontal, which other columns then decide. It is `CROSS_COVARIANCE` for a covariance of two axes, and
-    `UNCLEAR` for an accuracy that is not known. It is None for a column that states no accuracy of a position.
+    The standard name is `sigma_east` or `variance_east`, or the same for another axis. It is `horizontal_accuracy` or
+    `vertical_accuracy`, and `position_accuracy` for an accuracy without a direction. It is `sigma_h` if h may mean
+    height or horizontal, which is then decided from the other columns. It is `CROSS_COVARIANCE` for a covariance of
+    two axes, `UNCLEAR` for an unknown accuracy, and None for a column that does not state the accuracy of a position.
 
     The returned unit is `unit`, or else the unit at the end of the column's name, or None.
     """
@@ -143,7 +143,7 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """Standard name of the accuracy that a column states, as in `meaning_of`, from the words of the column's name.
+    """Standard name of an accuracy, as in `meaning_of`, from the words in the name of its column.
 
     Returns None if the name does not look like an accuracy.
     """
@@ -201,12 +201,12 @@ def _of_variance(axis_tokens: Sequence[str]) -> str:
 
 
 def _is_cross(token: str) -> bool:
-    """Whether a word is the initials of two different axes among east, north, up and down, such as `en`."""
+    """Whether a word consists of the initials of two different axes among east, north, up and down, as in `en`."""
     return re.fullmatch(r"[enud]{2}", token) is not None and token[0] != token[1]
 
 
 def _is_velocity(tokens: Sequence[str]) -> bool:
-    """Whether the words of a column's name include v directly before an axis, as for a velocity along this axis."""
+    """Whether the words of a column name contain `v` directly before an axis, which indicates a velocity."""
     return any(first == "v" and second in "enudxyz" for first, second in pairwise(tokens))
 
 

@@ -29,7 +29,7 @@ J2_FACTOR = 1.08263e-3
 
 
 class Geodetic(NamedTuple):
-    """Geodetic latitude and longitude [rad], height above the ellipsoid [m]."""
+    """Geodetic latitude and longitude [rad], and height above the ellipsoid [m]."""
 
     latitude: float
     longitude: float
@@ -38,7 +38,7 @@ class Geodetic(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneAxes:
-    """Axes of a scene: origin [m], and unit vectors east, north and up there, all in Earth-fixed coordinates."""
+    """Axes of a scene: origin [m], and unit vectors east, north and up at the origin, in Earth-fixed coordinates."""
 
     origin: Vector
     axes: Axes
@@ -84,9 +84,9 @@ class SceneAxes:
         """Unit vectors of a platform's `ric` frame (radial, in-track, cross-track), in the axes of the scene.
 
         The radial axis points away from the Earth's centre. The cross-track axis is normal to the position and to the
-        velocity relative to the stars, v + ω×r, where v is the velocity in Earth-fixed axes, ω the Earth's rotation
-        rate and r the position. The in-track axis completes the frame. On an eccentric orbit it differs slightly from
-        the direction of the velocity (CCSDS 502.0-B, RTN).
+        inertial velocity v + ω×r, where v is the velocity in Earth-fixed axes, ω the Earth's rotation rate and r the
+        position. The in-track axis completes the frame. On an eccentric orbit it differs slightly from the direction
+        of the velocity (CCSDS 502.0-B, RTN).
         """
         r = self.earth_fixed(position)
         x, y, z = self.turned_back(velocity)
@@ -108,14 +108,14 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
     position, velocity : (3,)
         East, north, up; numbers or arrays (cases,). [m, m/s]
     axes : SceneAxes or None
-        Axes of a scene on the Earth. None means an Earth that does not turn, and is a sphere of mean radius directly
+        Axes of a scene on the Earth. If None, the Earth is a non-rotating sphere of mean radius, centred vertically
         below the scene.
 
     Notes
     -----
-    Derived here. With `axes` the acceleration is −∇U − 2ω×v − ω×(ω×r). The vector r from the Earth's centre is
-    written in axes that turn at the rate ω, and v is its rate in these axes. The potential of a flattened Earth is
-    −U = (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without `axes` the acceleration is −μr/r³.
+    Derived here. With `axes` the acceleration is −∇U − 2ω×v − ω×(ω×r). The vector r from the Earth's centre is given
+    in axes that rotate at the rate ω, and v is its rate of change in these axes. The potential of a flattened Earth
+    is −U = (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without `axes` the acceleration is −μr/r³.
     """
     if axes is None:
         x, y, up = position
@@ -169,7 +169,7 @@ def curvature_radii(sine: PerCase) -> tuple[PerCase, PerCase]:
 def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
     """Latitude [rad], longitude [rad] and height [m], each (...), of Earth-fixed coordinates (..., 3).
 
-    Bowring's iteration on the reduced latitude is used. It is valid for places more than a few kilometres from the
+    Bowring's iteration on the reduced latitude is used. It is valid for positions more than a few kilometres from the
     Earth's centre.
     """
     x, y, z = np.moveaxis(points, -1, 0)
@@ -217,10 +217,8 @@ def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
 def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
     """Unit vectors east, north and up at n geodetic positions, in Earth-fixed axes.
 
-    The result (3, 3, n) is indexed by direction, Earth-fixed component and position.
-
-
-    `latitude` and `longitude` are (n,). [rad]
+    `latitude` and `longitude` are (n,). [rad] The result (3, 3, n) is indexed by direction, Earth-fixed component and
+    position.
     """
     return np.ascontiguousarray(np.moveaxis(_directions(latitude, longitude), -1, 1))
 
@@ -249,9 +247,9 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
 
     Notes
     -----
-    Derived here. The direction of flight turns only with the normal of the ellipsoid, at the rate of speed divided by
-    the radius of curvature. Euler's formula gives this radius. The Runge-Kutta method of fourth order integrates in
-    Earth-fixed axes, where the poles need no special treatment.
+    Derived here. The direction of flight rotates only with the normal of the ellipsoid, at a rate equal to the speed
+    divided by the radius of curvature, which follows from Euler's formula. The fourth-order Runge-Kutta method
+    integrates in Earth-fixed axes, where the poles need no special treatment.
     """
     axes = axes_at(position)
     start = np.array(axes.origin)

@@ -3,7 +3,7 @@
 The error of a position from SGP4 is about 1 km at the epoch of the elements, and grows by 1 to 3 km with each day
 from the epoch (documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA
 2006-6753). The constants of WGS-72 are used, because the elements are made with them. The mean sidereal time of 1982
-turns positions from the true equator and mean equinox of date to Earth-fixed axes.
+is used to rotate positions from the true equator and mean equinox of date to Earth-fixed axes.
 
 Two-line sets follow Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5 catalogue
 numbers. Messages follow CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and CSV use the
@@ -89,13 +89,13 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name and catalogue number, as they are compared with the name in a mission."""
+        """Name and catalogue number, in the form that is compared with the name in a mission."""
         return (object_key(self.name), str(self.number))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrokenEntry:
-    """An entry of a catalogue that cannot be used: the reason, and its object's names that could be read."""
+    """An unusable entry of a catalogue: the reason, and the names of the object as far as they could be read."""
 
     problem: str
     names: tuple[str, ...] = ()
@@ -106,10 +106,9 @@ Entry = Elements | BrokenEntry
 
 
 def teme(elements: Elements) -> Callable[[Instant], Vector]:
-    """Return a function from an instant to the position of an object by SGP4. [m]
+    """Return a function that computes the position of an object at an instant by SGP4. [m]
 
     The axes are those of the true equator and mean equinox of date (TEME).
-
 
     Raises
     ------
@@ -150,11 +149,11 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """Return a function like `place`, from an instant to a position, but without rounding steps. [m]
+    """Return a smooth version of `place`, a function from an instant to a position, without rounding steps. [m]
 
     These steps grow with the time from the epoch of the elements. SGP4 counts minutes and angles from the epoch,
     so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100 days from the epoch. A polynomial of
-    slow time would follow these steps as bends of the path. Instead, Lagrange's polynomial goes through eight
+    slow time would follow these steps, and so curve the path. Instead, Lagrange's polynomial goes through eight
     positions 30 s apart. Its error in a low orbit is 1e-8 m, from its remainder term. It also smooths the jumps of a
     few millimetres that SGP4 makes every half day in resonant orbits.
     """
@@ -399,9 +398,9 @@ def _column(line: str, location: str, start: int, end: int, quantity: str, form:
 
 
 def _catalogue_number(line: str, location: str) -> int:
-    """Catalogue number from five digits, or from a letter and four digits.
+    """Read a catalogue number, written as five digits, or as a letter and four digits.
 
-    The letter A is 10, and the letters I and O are skipped.
+    The letter A means 10, B means 11 and so on; the letters I and O are not used.
     """
     text = line[2:7].strip()
     if re.fullmatch(r"\d{1,5}", text, re.ASCII):
@@ -424,7 +423,7 @@ def _epoch(line: str, location: str) -> Instant:
 
 
 def _drag(line: str, location: str) -> float:
-    """Drag term B*, written as five digits after an implied decimal point, and a signed exponent of one digit."""
+    """Read the drag term B*: five digits after an implied decimal point, and a signed one-digit exponent."""
     text = line[53:61].strip()
     match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
     if match is None:
@@ -440,7 +439,8 @@ _VERSION_KEYWORD = "CCSDS_OMM_VERS"
 class _Message:
     """An orbit mean-elements message as read: its keywords and values.
 
-    `problem` is a fault of its form, or empty. `is_complete` is whether all mandatory keywords are required.
+    `problem` describes a fault in the format of the message; empty if there is no fault. `is_complete` is set if
+    every keyword that the standard prescribes must be present, including keywords with a constant value.
     """
 
     where: str
@@ -504,9 +504,9 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
-    """Split a text into messages, from lines with a keyword and a value.
+    """Split text with a keyword and a value in each line into messages.
 
-    A keyword for the version begins each message.
+    Each message begins with the keyword for its version.
     """
     leaves: dict[str, str] = {}
     first_line, problem = 0, ""

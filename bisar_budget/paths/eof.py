@@ -116,8 +116,8 @@ def _text(file: MessageElement, key: str) -> str | None:
 def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str], int]:
     """Read the state vectors of a file, without repetitions.
 
-    Returns the state vectors, the numbers of their lines, all stated qualities other than nominal, and the number of
-    repeated state vectors.
+    Returns the state vectors, their line numbers, all stated qualities except nominal, and the number of repeated
+    state vectors.
     """
     samples: list[Sample] = []
     lines: list[int] = []

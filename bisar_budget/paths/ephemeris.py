@@ -43,7 +43,7 @@ class Interpolation:
 
     @property
     def nodes(self) -> int:
-        """Number of samples through which the polynomial goes."""
+        """Number of samples that the polynomial interpolates."""
         return (self.degree + 1) // 2 if self.is_hermite else self.degree + 1
 
     @property
@@ -54,7 +54,7 @@ class Interpolation:
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples of an object without a manoeuvre between them, so that a polynomial may go through them.
+    """Samples of an object that can be interpolated by a polynomial, because no manoeuvre lies between them.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class Segment:
     samples : sequence of Sample
         Times in TAI, positions and velocities.
     first, last : Instant
-        First and last useable time, in TAI. Between them the segment may be interpolated.
+        First and last time, in TAI, between which the segment may be interpolated.
     where : str
         File and line, for messages.
     words : str
         Description of the segment for reports.
     interpolation : Interpolation, optional
-        Interpolation that the file states. If None, the one with the smallest estimated error is chosen.
+        Interpolation that the file states. If None, the interpolation with the smallest estimated error is used.
     axes : str
         Axes of the positions.
     turn : callable, optional
@@ -108,9 +108,9 @@ def orbit_through(
 ) -> Orbit:
     """Orbit of an object through the segment that contains the middle of the aperture.
 
-    If there are several such segments, the one whose nearer end is farthest from the middle is used for all instants.
-    The error of the interpolation is estimated: it is the distance to a polynomial with two more degrees. An error of
-    1 m or more gives a warning in `Orbit.doubts`.
+    If there are several such segments, the segment whose nearer end is farthest from the middle is used for all
+    instants. The error of the interpolation is estimated as its distance from a polynomial whose degree is higher by
+    two. An error of 1 m or more causes a warning in `Orbit.doubts`.
 
     `segments` are the segments of a file. The other arguments are those of `OrbitFormat.read`. Raises `PathFileError`
     if several objects are possible, if the file has no position at `center`, or if its samples there are too far
@@ -246,11 +246,11 @@ def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, In
 
 
 def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Interpolation) -> float:
-    """Estimated error of an interpolation near a time: its distance from an interpolation with two more degrees. [m]
+    """Estimated error of an interpolation near a time: its distance from a polynomial of a degree higher by two. [m]
 
-    The distance is taken at the time itself and midway between the samples around it, and the larger one counts. If
-    there are too few samples for two more degrees, the second interpolation has two degrees less. The result is
-    infinite if this is not possible either.
+    The result is the larger of the distances at the time itself and midway between the samples around it. If there
+    are too few samples for the higher degree, a degree lower by two is used instead. If this is not possible either,
+    the result is infinite.
     """
     step = 1 if interpolation.is_hermite else 2
     nodes, is_hermite = interpolation.nodes, interpolation.is_hermite
@@ -293,10 +293,10 @@ def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segm
 
 
 def velocity_error(samples: Sequence[Sample]) -> float:
-    """Largest relative difference between the velocities of samples and the rate of change of their positions.
+    """Largest relative difference between the velocities of samples and the rates of change of the positions.
 
-    About sixteen pairs of neighbouring samples are compared. One pair is not enough: velocities that are relative to
-    the wrong axes hardly differ near a pole, where the Earth's rotation hardly moves a position. The result is 0 for
+    About sixteen pairs of neighbouring samples are compared. One pair is not enough: near a pole, where the Earth's
+    rotation hardly moves a position, velocities relative to the wrong axes are almost correct. The result is 0 for
     too few samples, and NaN if a difference is not finite.
     """
     last = len(samples) - _NEIGHBOUR_SAMPLES
@@ -310,8 +310,8 @@ def velocity_error(samples: Sequence[Sample]) -> float:
 def _velocity_error_at(samples: Sequence[Sample], middle: int) -> float:
     """Relative difference between the stated velocities and the change of the positions, between two samples.
 
-    The samples are `middle` and the one before it. The stated velocities are interpolated, and averaged over the
-    interval by Gauss-Legendre quadrature. Their mean is compared with the change of position divided by the time.
+    These are the sample `middle` and the sample before it. The stated velocities are interpolated, and averaged over
+    the interval by Gauss-Legendre quadrature. Their mean is compared with the change of position divided by the time.
     Derived here.
     """
     neighbours = samples[middle - _NEIGHBOUR_SAMPLES : middle + _NEIGHBOUR_SAMPLES]

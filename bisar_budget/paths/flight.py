@@ -2,8 +2,8 @@
 
 All commands take a path as one polynomial over the aperture, or as several polynomials, each over a piece of the
 aperture. An orbit gives a position at any time, and its polynomial interpolates such positions. A log gives measured
-fixes. A polynomial or a spline smooths them by least squares; a spline has as many pieces as the log needs. Paths
-from orbits and from logs state their distance from the positions of the file.
+fixes. A polynomial or a spline smooths them by least squares; a spline has as many pieces as the log needs. Every
+path, from an orbit or a log, comes with its distance from the positions in the file.
 """
 
 import math
@@ -43,16 +43,16 @@ class SmoothingSettings:
     min_fixes : int
         Smallest number of fixes to which a path can be fitted.
     noise_fixes : int
-        Number of fixes that is enough to separate noise from motion. The shortest stretch of fixes contains the
-        aperture and at least this number.
+        Number of fixes that is sufficient to separate noise from motion. The shortest stretch contains the aperture
+        and at least this number of fixes.
     max_order : int
         Largest order of a polynomial that is the whole path.
     max_pieces : int
         Largest number of pieces of a spline.
     tried_coefficients, tried_ratio : int
         Limits of the search for a better spline. Splines with more pieces are tried, even if they do not improve the
-        path, up to the larger of two numbers of coefficients: `tried_coefficients`, which is enough for 40 full
-        circles, and `tried_ratio` times the number of coefficients of the best path so far.
+        path, up to a number of coefficients: `tried_coefficients`, which is sufficient for 40 full circles, or
+        `tried_ratio` times the number of coefficients of the best path so far, whichever is larger.
     clean_rms_m : float
         Root mean square of residuals below which a path gets no further pieces. [m]
     white_sigmas : float
@@ -63,10 +63,10 @@ class SmoothingSettings:
     samples_per_piece : int
         Smallest number of such times in a piece.
     mode_fraction : float
-        Modes of a `PathNoise` smaller than this fraction of the largest mode are left out as rounding.
+        Modes of a `PathNoise` smaller than this fraction of the largest mode are discarded as rounding errors.
     stretch_ratio, widest_ratio : float
-        Stretches of increasing duration are fitted. `stretch_ratio` is the ratio of the duration of a stretch to that
-        of the next shorter stretch, and `widest_ratio` the ratio of the longest to the shortest.
+        Stretches of increasing duration are fitted. `stretch_ratio` is the ratio of the durations of successive
+        stretches, and `widest_ratio` is the ratio of the longest to the shortest duration.
     max_fitted_fixes : int
         Largest number of fixes in a stretch.
     negligible_noise_m : float
@@ -75,7 +75,7 @@ class SmoothingSettings:
     chance_factor : float
         The squared difference of two fits counts as noise up to this factor times its expected variance.
     hopeless_ratio : float
-        No longer stretch is tried if the squared predicted error exceeds the smallest one so far by this ratio.
+        No longer stretch is tried if the squared predicted error exceeds its smallest value so far by this ratio.
     residual_ratio : float
         The fit of a longer stretch is rejected if the residual in the aperture grows by more than this ratio, because
         the fit then does not follow the path.
@@ -116,7 +116,6 @@ class PathFileError(Exception):
     """Raised for a file from which no path can be read.
 
     The message names the file, and its line, byte or record.
-
 
     `accepted` describes an accepted file, and `hint` a remedy. `key` is the key of the mission file that contradicts
     the file; it is empty if the file itself is wrong. `spans` are the times that the file covers, if it does not
@@ -198,8 +197,8 @@ class Orbit:
     def as_planned(self) -> "Orbit":
         """Return the orbit as a plan that the satellite follows exactly.
 
-        Its uncertainty is only that of the Earth's orientation. The age of the elements and the error of the
-        interpolation do not count.
+        Its uncertainty is due to the Earth's orientation only. The age of the elements and the error of the
+        interpolation are disregarded.
         """
         words = f"{self.words}, flown as planned: its age and its interpolation do not count"
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
@@ -217,7 +216,8 @@ class Orbit:
 class LeftOut:
     """The m unusable records of a log.
 
-    `before` (m,) is the number of usable records before each of them. `faults` are messages about them.
+    `before` (m,) is the number of usable records before each unusable record. `faults` are messages about the
+    unusable records.
     """
 
     before: NDArray[np.int64]
@@ -231,7 +231,7 @@ class Log:
     Attributes
     ----------
     times : (n,)
-        Rising times of the fixes since `start`. Without `start` they count on the clock of the log. [s]
+        Times of the fixes since `start`, in ascending order. Without `start`, times are on the clock of the log. [s]
     places : (n, 3)
         Positions of the fixes, Earth-fixed or in the scene's axes. [m]
     is_earth_fixed : bool
@@ -239,23 +239,24 @@ class Log:
     words : str
         Description of the log for reports.
     start : Instant, optional
-        Instant of UTC from which times count.
+        Origin of `times`, in UTC.
     sigmas : (n, 3), optional
         One-sigma errors east, north, up that the log states; NaN at a fix without them. [m]
     typical_sigmas : (n,), optional
-        Usual one-sigma error of a fix of the stated quality, on each axis; NaN at a fix without a quality. [m]
+        Typical one-sigma error of a fix of the stated quality, on each axis; NaN at a fix without a quality. [m]
     quality_words : callable
-        Function from the index of a fix to its quality in words, such as "GGA quality 1, autonomous".
+        Function that returns a description of the quality of the fix with a given index, such as "GGA quality 1,
+        autonomous".
     clock : str
-        "day" if times count from a midnight of UTC, "week" if they count from the beginning of a GPS week.
+        "day" if times are counted from midnight UTC, "week" if they are counted from the start of a GPS week.
     left_out : LeftOut, optional
         Records that cannot be used and are not among the fixes.
     tracks : tuple of Log
         Logs of all tracks of a file with several tracks, if the mission file does not choose one. The log itself is
         then that of the first track.
     grid : (3, 3)
-        Vectors of one rounding step of each coordinate that the log writes, in the axes of the positions. [m] A zero
-        vector means that no rounding is found.
+        Displacement vectors due to one rounding step of each coordinate in the log, in the axes of the positions. [m]
+        A zero vector means that no rounding was found.
     """
 
     times: Floats
@@ -291,16 +292,16 @@ class Fitted:
     stretch : float
         Length of the time span around mid-aperture whose fixes the path smooths. [s]
     missed : float
-        Root mean square distance of a fix of the log from the path that is fitted without the fix. [m]
+        Root mean square distance of a fix of the log from a path that is fitted without this fix. [m]
     residual : (3, 3)
         Covariance of the residuals of the fixes in the aperture. [m²]
     correlation_time : float
         Correlation time of a Gauss-Markov process that is correlated like the residuals. [s]
     acceleration_noise : (3, 3)
-        Covariance of the error of the acceleration. [m²/s⁴] The causes are noise of the fixes, and motion that is
-        smeared if fixes beyond the shortest time span are smoothed. For one polynomial, it is the error at
-        mid-aperture. For several pieces, it is the acceleration of the parabola that fits the error over the
-        aperture.
+        Covariance of the error of the acceleration. [m²/s⁴] The error is caused by noise of the fixes, and by motion
+        that is smeared if fixes beyond the shortest time span are smoothed. For a single polynomial, it is the error
+        at mid-aperture. For several pieces, it is the acceleration of the parabola that is fitted to the position
+        error over the aperture.
     path_noise : PathNoise, optional
         Error of the path over the aperture due to the same causes.
     pieces : int
@@ -419,10 +420,10 @@ class _SmoothFit:
 
     @property
     def common_motion(self) -> tuple[float, float]:
-        """Mean scalar product of each residual and the next residual, and the standard deviation of this mean. [m²]
+        """Mean scalar product of successive residuals, and the standard deviation of this mean. [m²]
 
-        For fixes with white noise the expected mean is zero. The fit itself would make it negative; the mean is
-        corrected for this.
+        For fixes with white noise the expected mean is zero. The mean is corrected for the effect of the fit, which
+        would make it negative.
         """
         products = (self.residuals[1:] * self.residuals[:-1]).sum(axis=1)
         mean, square = float(products.mean()), float(np.mean(np.sum(self.residuals**2, axis=1)))
@@ -459,9 +460,10 @@ class _SmoothFit:
         return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
-        """Mean square of the path's error due to noise of the fixes, over slow times (m,). [m²]
+        """Mean square of the path error due to noise of the fixes, over slow times (m,). [m²]
 
-        `left_out` (m, m) is a projection, for example onto straight lines. This part of the error does not count.
+        `left_out` (m, m) is a projection, for example onto straight lines. The projected part of the error is
+        excluded.
         """
         basis = self.basis(times)
         basis = basis - left_out @ basis
@@ -470,8 +472,8 @@ class _SmoothFit:
     def acceleration_noise(self, aperture_time_s: float) -> Floats:
         """Covariance (3, 3) of the error of the acceleration due to noise of the fixes. [m²/s⁴]
 
-        For a polynomial, this is the error at mid-aperture. The pieces of a spline have different errors. So for a
-        spline, it is the acceleration of the parabola that fits the error over the aperture.
+        For a polynomial, this is the error at mid-aperture. For a spline, whose pieces have different errors, it is
+        the acceleration of the parabola that is fitted to the position error over the aperture.
         """
         if self.spline is None:
             bends = np.array([legendre.legval(0.0, legendre.legder(series, 2)) for series in np.eye(self.order + 1)])
@@ -511,9 +513,9 @@ class _SmoothFit:
 def _information(residuals: Floats, coefficients: int, independent: float) -> float:
     """Information criterion of a fit with residuals (n, 3) [m]. A smaller value is better.
 
-    Each axis has its own noise, and the same number of coefficients. The last factor of the cost is that of AICc
-    (Hurvich & Tsai 1989). It corrects for a small number of fixes, to which a path with many coefficients fits too
-    well by chance. `independent` is the number of independent fixes with the same information.
+    Each axis has its own noise variance, and the same number of coefficients. The last factor of the cost is taken
+    from AICc (Hurvich & Tsai 1989). It corrects for overfitting: a path with many coefficients fits a small number of
+    fixes too well by chance. `independent` is the number of independent fixes with the same information.
     """
     count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
@@ -523,8 +525,8 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
     """Fit the path with the smallest Bayesian information criterion (Schwarz 1978) to the fixes of a stretch.
 
-    The path is a polynomial. With `may_have_pieces` it is a spline if the criterion of the spline is smaller.
-    `half_s` is half the length of the stretch. [s]
+    The path is a polynomial. If `may_have_pieces` is set, a spline is also tried, and used if its criterion is
+    smaller. `half_s` is half the length of the stretch. [s]
     """
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())
@@ -539,10 +541,10 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
 
 
 def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
-    """Replace a polynomial by a spline fitted to the same fixes (n, 3) [m] if the spline's criterion is smaller.
+    """Replace a polynomial by a spline fitted to the same fixes (n, 3) [m] if this improves the criterion.
 
-    The criterion is that of `_information`. Pieces are halved, see `splines`, as long as neighbouring residuals are
-    correlated.
+    The criterion is computed by `_information`. Pieces are halved, see `splines`, as long as neighbouring residuals
+    are correlated.
     """
     best = newest = fit
     edges: Floats | None = np.array([-fit.half_s, fit.half_s])
@@ -582,8 +584,8 @@ def _widened(
     this distance is the square of the smear plus the squared noise that the longer stretch avoids. The excess over
     that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
 
-    Only the part of the error that is not a straight line in slow time is minimised, because this part defocuses. In
-    addition, the error of the whole path and the residual in the aperture must not grow.
+    Only the part of the error that is not linear in slow time is minimised, because only this part defocuses the
+    image. In addition, the error of the whole path and the residual in the aperture must not grow.
     """
     sample_times, has_pieces = narrowest.sample_times(aperture_time_s), narrowest.spline is not None
     straight = np.linalg.qr(np.vander(sample_times, 2))[0]
@@ -636,31 +638,31 @@ def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
 def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
     """Path that fits the fixes of a log around the aperture by least squares.
 
-    The order has the smallest Bayesian information criterion (Schwarz 1978). It is at most 8, and at most half the
-    number of fixes. If the residual of one polynomial still contains motion, the path is a spline. The same criterion
-    chooses the number of its pieces, see `splines`. Faster motion of the platform counts as noise of the log, or as
-    vibration. Fixes with correlated residuals count as fewer fixes, so that a slow error of the log, which looks like
-    motion, is not fitted.
+    The path is a polynomial of the order with the smallest Bayesian information criterion (Schwarz 1978), which is at
+    most 8, and at most half the number of fixes. If the residual of a single polynomial still contains motion, the
+    path is a spline, whose number of pieces is chosen by the same criterion, see `splines`. Motion that is too fast
+    for the path counts as noise of the log, or as vibration. Fixes with correlated residuals count as fewer fixes, so
+    that a slow error of the log, which looks like motion, is not fitted.
 
-    The stretch is the time span whose fixes are smoothed. It is the shortest one around the aperture, or a longer one
-    with a smaller predicted error of the path, see `_widened`. This matters because noise of the log becomes an
-    acceleration of the path, which makes allowables wrong.
+    The stretch is the time span whose fixes are smoothed. It is the shortest possible span around the aperture, or a
+    longer span if the predicted error of the path is then smaller, see `_widened`. This matters because noise of the
+    log causes an apparent acceleration of the path, which makes allowables wrong.
 
-    `Fitted.missed` is computed by leaving out one fix after the other (Allen 1974). These are the fixes in the
-    aperture, and the ones directly before and after it. `missed` contains the noise, the motion that the polynomial
-    does not follow, and the motion between two fixes, which a log with a low rate does not show. If the path has more
-    noise than a fix, as in a gap, `missed` is larger by that ratio.
+    `Fitted.missed` is computed by leaving out, one at a time, the fixes in the aperture and the fixes directly before
+    and after it (Allen 1974). `missed` contains the noise, the motion that the polynomial does not follow, and the
+    motion between two fixes, which a log with a low rate does not show. If the path has more noise than a fix, as in
+    a gap, `missed` is multiplied by this ratio.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Slow times, rising; fixes outside the stretch are not used. [s]
+        Slow times, in ascending order; fixes outside the stretch are not used. [s]
     positions : (n, 3) ndarray
         Positions of the fixes in the axes of the scene. [m]
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
-        Length of the longest time span around the middle whose fixes may be smoothed. If omitted, the shortest
+        Length of the longest time span around mid-aperture whose fixes may be smoothed. If omitted, the shortest
         stretch is used. [s]
 
     Raises
@@ -670,8 +672,8 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 
     Notes
     -----
-    The distance of a fix from the path that is fitted without it is r/(1 - h), with the residual r and the leverage
-    h of the fix (Belsley, Kuh & Welsch 1980, 2.1).
+    The distance of a fix from a path fitted without this fix is r/(1 - h), where r is the residual and h the leverage
+    of the fix (Belsley, Kuh & Welsch 1980, 2.1).
     """
     half = stretch_around(times, aperture_time_s) / 2
     count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
@@ -721,10 +723,10 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Slice that selects the fixes in the aperture, and one before and one after it, from slow times (n,) [s].
+    """Slice that selects the fixes in the aperture, and one fix before and after it, from slow times (n,) [s].
 
-    The accuracy of a log is the largest sigma of these fixes. The mean sigma would be smaller than the error of the
-    log at some times of the aperture.
+    The accuracy of a log is the largest sigma of these fixes, because the mean sigma would be smaller than the error
+    of the log at some times in the aperture.
     """
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
@@ -743,23 +745,23 @@ def slow_times(
     center : Instant or None
         Middle of the aperture, for a log in UTC; ignored for any other log.
     center_seconds : float or None
-        Middle of the aperture on the clock of a log that is not in UTC; None is 0 s. [s]
+        Middle of the aperture on the clock of a log that is not in UTC; None means 0 s. [s]
     aperture_time_s : float
         Length of the aperture. [s]
     name : str
-        The file in messages.
+        Name of the file in messages.
 
     Returns
     -------
     (n,) ndarray
-        0 is the middle of the aperture. [s]
+        Slow times, relative to the middle of the aperture. [s]
 
     Raises
     ------
     PathFileError
         The log begins or ends more than one median interval inside the aperture, has a gap in the aperture, or does
         not have the clock on which the middle is given. A gap is longer than five median intervals. The median
-        interval is that of the fixes in the aperture or that of the whole log, whichever is smaller.
+        interval is computed for the fixes in the aperture and for the whole log, and the smaller value is used.
     """
     times, start = log.times, log.start
     _hold_to_clock(log, center, center_seconds, name)
@@ -778,7 +780,7 @@ def slow_times(
     slow, half = times - middle, aperture_time_s / 2
 
     def cause(index: int) -> str:
-        """Message about an unusable record directly before the fix with a given index; empty if there is none."""
+        """Message about an unusable record directly before the fix with a given index, or an empty string."""
         if log.left_out is None or index not in log.left_out.before:
             return ""
         return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
@@ -808,7 +810,7 @@ def slow_times(
 
 
 def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | None, name: str) -> None:
-    """Refuse a log of times of day without a date, and a log of seconds of an unknown GPS week.
+    """Refuse a log whose times are times of day without a date, or seconds of an unknown GPS week.
 
     Such a log is accepted if `center_seconds` gives the middle of the aperture on the clock of the log.
     """
@@ -830,9 +832,10 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 
 
 def dated(log: Log, center: Instant | None) -> Log:
-    """Add a date to a log that has only times of day, so that it is nearest to the middle of the aperture.
+    """Add a date to a log that has only times of day.
 
-    Any other log is returned unchanged, and so is every log if `center` is None.
+    The date is chosen so that the log is as close as possible to the middle of the aperture, `center`. Logs of all
+    other kinds are returned unchanged, as is every log if `center` is None.
     """
     if log.clock != "day" or log.start is not None or center is None:
         return log
@@ -845,7 +848,7 @@ def dated(log: Log, center: Instant | None) -> Log:
 def track_around(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Log:
-    """Track that covers the aperture in a log of several tracks; a log without several tracks is returned unchanged.
+    """Track that covers the aperture in a log of several tracks; any other log is returned unchanged.
 
     The parameters are the same as in `slow_times`.
 
@@ -886,8 +889,8 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
     Parameters
     ----------
     log : Log
-        The log. An unusable record has no time. It counts as in the stretch if the interval between the usable fixes
-        around it overlaps the stretch.
+        The log. An unusable record has no time. It counts as inside the stretch if the interval between the usable
+        fixes before and after it overlaps the stretch.
     times : (n,) ndarray
         Slow times of the log. [s]
     stretch_s : float
@@ -914,8 +917,8 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
 def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
     """Longest time span around the middle of an aperture within which a log is complete. [s]
 
-    It ends before an unusable record, and before a gap of more than five median intervals. If these lie outside the
-    shortest stretch that the path needs, the log can be used, but not its fixes beyond them.
+    The span ends before the nearest unusable record or gap of more than five median intervals. A log with such a
+    record or gap outside the shortest stretch can still be used, except for the fixes beyond the record or gap.
 
     Parameters
     ----------
@@ -943,7 +946,7 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
 
 
 def _independent(residuals: Floats) -> float:
-    """Number of independent samples that would contain as much information as correlated residuals (n, 3).
+    """Number of independent samples that contain as much information as the correlated residuals (n, 3).
 
     The number is n for white noise. Otherwise, n is divided by the sum of the autocorrelation up to its first zero.
     The autocorrelation is the mean over the three axes.
@@ -980,10 +983,10 @@ def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tu
 def powers_of(
     coefficients: Floats, half_s: float, convert: Callable[[Floats], NDArray[np.floating]] = legendre.leg2poly
 ) -> Floats:
-    """Convert the coefficients of a series over -`half_s` … `half_s` to coefficients of τ⁰, τ¹, …. [m], [m/s], …
+    """Convert the coefficients of a series over -`half_s` … `half_s` to coefficients of τ⁰, τ¹, … [m, m/s, …]
 
-    Coefficients and result are (order + 1, 3). `convert` does this for one axis and a series over -1 … 1; the default
-    is for a Legendre series.
+    Coefficients and result are (order + 1, 3). `convert` converts the coefficients of a series over -1 … 1 on one
+    axis; the default is for a Legendre series.
     """
     powers = np.zeros_like(coefficients)
     for axis in range(3):
@@ -1021,8 +1024,8 @@ class Sample(NamedTuple):
 def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
     """Position at a time, interpolated from the `count` samples around it. [m]
 
-    All times between two neighbouring samples use the same `count` samples. The sample at the boundary of two
-    intervals is among the samples of both intervals, for even and odd `count`. So the path has no jumps.
+    The same `count` samples are used for all times between two neighbouring samples. A sample at the boundary of two
+    intervals is used in both intervals, for even and odd `count`, so that the path has no jumps.
     """
     after = bisect_right(samples, time, key=lambda sample: sample.time)
     first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
@@ -1033,7 +1036,7 @@ def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite
 def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
     """Position at time 0 on a polynomial through samples: Lagrange's, or Hermite's if velocities are used too. [m]
 
-    `times` are the times of the samples, relative to the wanted time. [s] The result is NaN if it overflows.
+    `times` are the times of the samples, relative to the requested time. [s] The result is NaN if it overflows.
 
     Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
     """

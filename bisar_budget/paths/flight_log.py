@@ -13,8 +13,8 @@ It may also be Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` from the scen
 an altitude into a height.
 
 `sigma_east`, `sigma_north` and `sigma_up`, or the names that other programs use, are one-sigma errors of the
-position. A cell in these columns is ignored if it has no number above 0. A column that may be an accuracy, but is not
-known, is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
+position. A cell in these columns is ignored if it does not contain a positive number. An unknown column that may be
+an accuracy is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
 some exporters are also accepted; they are listed below.
 """
 
@@ -90,7 +90,7 @@ _CLOCKS_APART_S = 1.0  # accepted drift of an exporter's two clocks, beyond the 
 class _Column(NamedTuple):
     """A column that is read: its name, unit as written, factor to SI, and index in a row. A time stamp has no unit.
 
-    Columns of exporters get the names of the columns of plain logs. Exporters have further columns: `unix` (time
+    Columns of exported logs are renamed like the columns of plain logs. They include further columns: `unix` (time
     since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), and `receiver` (number of the receiver).
     """
 
@@ -103,8 +103,8 @@ class _Column(NamedTuple):
 class _Vendor(NamedTuple):
     """A program that exports logs: its name in reports, the column names that identify it, and its columns.
 
-    `columns` are the columns of a plain log by the names that the exporter gives them, in lower case. `least_fix` is
-    the lowest number of a kind of fix that has a height.
+    `columns` maps the column names of the exporter, in lower case, to the columns of a plain log. `least_fix` is the
+    lowest code of a kind of fix that has a height.
     """
 
     words: str
@@ -134,7 +134,7 @@ class _Header:
 
     @property
     def columns(self) -> tuple[_Column, ...]:
-        """All columns of a `_Table` in their order: `numbers`, then `accuracy`."""
+        """All columns of a `_Table` in order: first `numbers`, then `accuracy`."""
         return (*self.numbers, *self.accuracy)
 
     @property
@@ -155,7 +155,7 @@ class _Table(NamedTuple):
     """Rows of a log: their line numbers (n,), numbers (n, columns) in units of the file, and time stamps.
 
     A time stamp is split into two numbers: `minutes`, the seconds from MJD 0 to the start of its minute, and
-    `seconds` within the minute. [s] `minutes` is NaN if an exporter leaves the stamp out.
+    `seconds` within the minute. [s] `minutes` is NaN if the exporter omits the time stamp.
     """
 
     lines: NDArray[np.int64]
@@ -211,9 +211,9 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
     """Select the rows that have a position; return them and the number of rows without a position.
 
-    The rows of a plain log are unchanged. From the log of an exporter, rows without a fix are left out, and rows of
-    receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers
-    and the mission file does not choose one, or if it chooses one and the log has no column of receivers.
+    The rows of a plain log are unchanged. From an exported log, rows without a fix are dropped, as are rows of
+    receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers and the
+    mission file does not choose one, or if it chooses one and the log has no column of receivers.
     """
     receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
@@ -250,9 +250,9 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times of the rows [s], the instant from which they count, and a text about the accuracy of this instant.
+    """Times of the rows [s], the instant from which they are counted, and a note on its accuracy, which may be empty.
 
-    The instant is in the time scale of the header. It is None if the log does not state it. The text may be empty.
+    The instant is in the time scale of the header. It is None if the log does not state it.
     """
     time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
@@ -291,11 +291,11 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
 def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
     """Convert the times of a fine clock to UTC, with time stamps from a second clock that writes whole seconds.
 
-    `counted_s` are the times of the fine clock, and `instants` the stamps. [s] Stamps are truncated to whole seconds.
-    So the instant at which the fine clock was 0 is at or after every difference of a stamp and its time, and less
-    than 1 s after it. These differences bound the instant, and the middle between the bounds is taken. Returns the
-    times from the first row on [s], the instant of the first row, and a text about the accuracy of UTC. Raises
-    `PathFileError` if there is no stamp, or if the clocks drift apart.
+    `counted_s` are the times of the fine clock, and `instants` the time stamps, truncated to whole seconds. [s] In
+    each row, the stamp minus the fine time is at most the UTC at which the fine clock was zero, and less than 1 s
+    before it. All rows together bound this UTC, and the midpoint of the bounds is used. Returns the times since the
+    first row [s], the instant of the first row, and a note on the accuracy of UTC. Raises `PathFileError` if there is
+    no stamp, or if the clocks drift apart.
     """
     has_instant = np.isfinite(instants) & records.is_usable
     if not has_instant.any():
@@ -320,7 +320,7 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
 
 
 def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) that the header names, with latitude and longitude in rad and all others in m.
+    """Coordinates (3, n) named by the header; latitude and longitude are in rad, all other coordinates in m.
 
     An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are marked as unusable
     in `records`.
@@ -381,8 +381,8 @@ def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
 def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[str, Floats], str]:
     """One-sigma errors (n,) [m] by name, such as `sigma_east`, and a note on the number of unusable cells.
 
-    A row is left out if one of its accuracy cells has a text that no program writes for a missing value. If a log
-    states both a sigma and a variance of the same axis, the larger error counts.
+    A row is dropped if an accuracy cell contains neither a number nor a usual code for a missing value. If a log
+    states both a sigma and a variance of the same axis, the larger error is used.
     """
     figures: dict[str, Floats] = {}
     negative = 0
@@ -406,7 +406,7 @@ def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -
     """One-sigma errors (n, 3) east, north, up; NaN for an unknown error. [m]
 
     `figures` are errors (n,) by name, from `_figures`, and `positions` are the coordinates (3, n). If several columns
-    state the error of the same axis, the largest error counts. Returns None if no row states an error.
+    state the error of the same axis, the largest error is used. Returns None if no row states an error.
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
@@ -481,11 +481,11 @@ def _accuracy_columns(
     refuse: Callable[[str], NoReturn],
     level_columns: Mapping[str, _Column] = MappingProxyType({}),
 ) -> tuple[_Column, ...]:
-    """Columns that state errors of positions, from the cells of a header.
+    """Find the columns that state position errors, from the cells of a header.
 
-    `kind` are the names of the coordinates. `level_columns` are columns of errors that are known already, and come
-    first in the result. `refuse` raises the error for a column that is unclear, given twice, or incomplete without
-    another column.
+    `kind` are the names of the coordinates. `level_columns` are error columns that are already known, and come first
+    in the result. `refuse` is called to raise an error if a column is unclear or given twice, or if a column that it
+    needs is missing.
     """
     columns = dict(level_columns)
     has_covariance = False
@@ -521,7 +521,7 @@ def _accuracy_columns(
 
 
 def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoReturn]) -> dict[str, _Column]:
-    """Rename columns of errors whose names may mean the height or a horizontal error.
+    """Rename error columns whose names may mean either the height or a horizontal error.
 
     A `sigma_h` is a horizontal error if the log has a vertical accuracy. It is a height error if the log has an east
     error and no other error of the height. Any other `sigma_h` is refused. A `sigma_up` becomes a vertical accuracy
@@ -544,7 +544,7 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     """Read the header of a log from its first line that is neither blank nor a comment.
 
-    Raises `PathFileError` if the header is empty, or its columns are missing, given twice or contradictory.
+    Raises `PathFileError` if the header is empty, or if columns are missing, given twice or contradictory.
     """
     at = next((n for n, line in enumerate(lines) if _has_content(line)), None)
     if at is None:
@@ -621,7 +621,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
 def _vendor_header(
     vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
-    """Make the header of a log that a known exporter has written, from the cells of its first line."""
+    """Make the header of a log written by a known exporter, from the cells of the first line."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         column = vendor.columns.get(cell.strip().lower())
@@ -678,10 +678,10 @@ def _measured(
 
 @dataclass(eq=False)
 class _Rows:
-    """Rows of a log that are read so far.
+    """Rows of a log that have been read so far.
 
-    `broken` are messages about unusable rows, by line. `most_broken` is the largest number of such rows. `empty` is
-    the number of rows in which an exporter left numbers out.
+    `broken` are messages about unusable rows, by line. `most_broken` is the largest permitted number of such rows.
+    `empty` is the number of rows in which an exporter left cells for numbers empty.
     """
 
     tables: list[_Table]
@@ -691,12 +691,12 @@ class _Rows:
 
     @property
     def table(self) -> _Table:
-        """All rows that are read so far, joined to one table."""
+        """All rows that have been read so far, joined into one table."""
         return _Table(*(np.concatenate(columns) for columns in zip(*self.tables, strict=True)))
 
 
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
-    """Read all rows after the header, many lines at once, which is fast and needs little memory."""
+    """Read all rows after the header, in chunks of many lines, which is fast and needs little memory."""
     nothing = np.zeros(0)
     empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
@@ -751,7 +751,7 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
 
 
 def _is_complete(text: str, header: _Header) -> bool:
-    """Whether a row has a text in each column of numbers.
+    """Whether a row has no empty cell in its columns of numbers.
 
     A row with a wrong number of cells counts as complete here.
     """
@@ -789,7 +789,7 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
     """Numbers (n, columns) and time stamps of rows whose cells may have quotes; None if they cannot be read.
 
-    The time stamps are None if the log has no column of time stamps. Reading takes six times as long as by
+    The time stamps are None if the log has no column of time stamps. This takes six times as long as
     `_plain_cells`.
     """
     try:
@@ -821,8 +821,7 @@ def _or_nan(cell: str) -> float:
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
     """Split time stamps into the start of their minute, in seconds from MJD 0, and the seconds within the minute. [s]
 
-    If an exporter leaves a stamp out, the start is NaN and the seconds are 0. Returns None if a text is no time
-    stamp.
+    If the exporter omits a stamp, the start is NaN and the seconds are 0. Returns None if a text is not a time stamp.
     """
     has_text = [bool(text) or header.vendor is None for text in texts]
     minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]
@@ -837,7 +836,7 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
 @lru_cache(maxsize=256)
 def _minute(text: str) -> float | None:
-    """Seconds from MJD 0 to the minute of a time stamp, from its text without seconds; None for other text. [s]
+    """Time from MJD 0 to the minute of a time stamp, given without its seconds; None if it is not a time stamp. [s]
 
     Many rows share a minute, so results are cached.
     """
@@ -983,7 +982,7 @@ _VENDORS = (
 
 
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
-    """Exporter that has written a header, known by its column names in the cells; None if no exporter is known."""
+    """Exporter that wrote a header, recognised by the column names in the cells; None if it is unknown."""
     names = [cell.strip().lower() for cell in cells]
     return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 

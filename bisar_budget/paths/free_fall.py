@@ -35,11 +35,11 @@ class FreeFall:
     centre : Vectors
         Position of the Earth's centre. [m]
     rotation : Vectors
-        Rate at which the axes turn relative to the stars, along the Earth's axis. [rad/s] It is zero for a scene
-        without a position on the Earth; then the Earth is a sphere.
+        Inertial rotation rate of the axes, along the Earth's axis. [rad/s] It is zero for a scene without a position
+        on the Earth; the Earth is then a sphere.
     share : float or (cases,)
-        1 in cases with a platform in free fall, and 0 in all other cases. In these other cases errors are
-        p + vτ + aτ²/2, without gravity and rotation.
+        1 in cases with a platform in free fall, and 0 in all other cases, in which the position error is p + vτ +
+        aτ²/2, without gravity and rotation.
     """
 
     centre: Vectors
@@ -47,7 +47,7 @@ class FreeFall:
     share: PerCase = 1.0
 
     def motions(self, path: PlatformState, half: Floats, places: Floats) -> Floats:
-        """Position error over the aperture due to a unit error of position, velocity or acceleration at mid-aperture.
+        """Position error over the aperture due to unit errors of position, velocity and acceleration at mid-aperture.
 
         Parameters
         ----------
@@ -61,16 +61,16 @@ class FreeFall:
         Returns
         -------
         (3, 3, 3, nodes, cases)
-            Position errors. [m] The indices are the unit error (1 m of position, 1 m/s of velocity, 1 m/s² of
-            acceleration), the axis of this error, the component east, north or up, the slow time and the case. The
-            velocity error is the rate of the position error in the axes of the scene. The acceleration error is
-            constant in these axes.
+            Position errors. [m] The array is indexed by the unit error (1 m of position, 1 m/s of velocity, 1 m/s²
+            of acceleration), the axis of this error, the component (east, north, up), the slow time and the case. The
+            velocity error is the rate of change of the position error in the axes of the scene. The acceleration
+            error is constant in these axes.
 
         Notes
         -----
         Derived here. In axes that turn at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gravity gradient G.
-        The accelerations are a polynomial that solves the equation at Gauss-Legendre nodes. Their values at the nodes
-        are the solution of one linear system per case.
+        The acceleration is approximated by a polynomial that satisfies the equation at Gauss-Legendre nodes. Its
+        values at the nodes are the solution of one linear system per case.
         """
         collocation = _collocation()
         cases, count = half.size, collocation.times.size
@@ -95,7 +95,7 @@ class FreeFall:
     def _matrices(self, path: PlatformState, times: Floats, cases: int) -> tuple[Floats, Floats]:
         """Matrices of the linearised dynamics: G − ω×(ω×·) (cases, nodes, 3, 3) [1/s²] and ω×· (cases, 3, 3) [1/s].
 
-        G is the gravity gradient, and ω the rate at which the axes turn. `times` are slow times (nodes, cases). [s]
+        G is the gravity gradient, and ω the rotation rate of the axes. `times` are slow times (nodes, cases). [s]
 
         Derived here. G is the second derivative of the potential of `earth.free_fall`. With the direction p of the
         Earth's axis, s = r̂·p and the equatorial radius R, the sphere has μ/r³·(3r̂r̂ᵀ − 1), and the flattening adds
@@ -127,15 +127,16 @@ class FreeFall:
         return gravity, spin
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate of change −ω×p, in scene axes, of a position error p that is constant relative to the stars.
+        """Rate of change −ω×p, in scene axes, of a position error p that is constant in inertial axes.
 
-        ω is the rate at which the axes turn. The result is in m/s for `position` in m, and in 1/s for a unit vector.
+        ω is the rotation rate of the scene axes. The result is in m/s for `position` in m, and in 1/s for a unit
+        vector.
         """
         x, y, z = cross(self.rotation, position)
         return (-x * self.share, -y * self.share, -z * self.share)
 
     def orbit_rate(self, path: PlatformState) -> Vectors:
-        """Angular rate of the orbit about the Earth's centre at mid-aperture, relative to the stars. [rad/s]"""
+        """Inertial angular rate of the orbit about the Earth's centre at mid-aperture. [rad/s]"""
         x, y, z = (p - c for p, c in zip(path.position, self.centre, strict=True))
         turned = cross(self.rotation, (x, y, z))
         u, v, w = (rate + more for rate, more in zip(path.velocity, turned, strict=True))
@@ -170,7 +171,7 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
     """Dynamics of the errors of a path, if it is in free fall above a height of 100 km; None for any other path.
 
     A path is in free fall if its acceleration differs from that of free fall by at most 5 % of gravity, μ/r². The
-    coordinates of the path may be arrays (cases,). Then `share` of the result says which cases are in free fall.
+    coordinates of the path may be arrays (cases,). Then `share` of the result indicates which cases are in free fall.
     """
     height, departure = departure_of(path, axes)
     falls = (height > LEAST_FALLING_HEIGHT_M) & (departure <= FREE_FALL_FRACTION)
@@ -208,18 +209,18 @@ class _Collocation:
     to_coefficients: Floats
 
     def twice_at(self, places: Floats) -> Floats:
-        """Matrix (places, N) from values at the nodes to the double integral from 0 to each of the times `places`."""
+        """Matrix (places, N) that converts values at the nodes to double integrals from 0 to the times `places`."""
         return _integral(places, 2) @ self.to_coefficients
 
 
 def _integral(places: Floats, times: int) -> Floats:
-    """Values (places, N), at the points `places`, of the N Legendre polynomials integrated `times` times from 0."""
+    """Evaluate the `times`-fold integrals from 0 of the first N Legendre polynomials at `places`; (places, N)."""
     return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ _integrated(times))
 
 
 @cache
 def _integrated(times: int) -> Floats:
-    """Legendre coefficients of the N Legendre polynomials integrated `times` times from 0.
+    """Legendre coefficients of the `times`-fold integrals from 0 of the first N Legendre polynomials.
 
     Each column of the result belongs to one polynomial.
     """

@@ -1,10 +1,10 @@
-"""Tracks of GPX 1.0 and 1.1: points with time and elevation, in one segment or in several with rising times.
+"""Tracks of GPX 1.0 and 1.1: points with time and elevation, in one or several segments in chronological order.
 
     <trkpt lat="48.086600" lon="11.279700"><ele>2953.1</ele><time>2026-06-01T05:20:01.250Z</time>
     <geoidheight>46.9</geoidheight></trkpt>
 
 An elevation is above mean sea level; `geoidheight` is the height of the geoid above the ellipsoid. Times are in UTC,
-or have an offset from UTC. A `fix` of none or 2d states that a point has no position or no height.
+or have an offset from UTC. A `fix` of `none` or `2d` means that a point has no position or no height, respectively.
 
 Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. `messages.parse_markup` builds the tree: unlike
 gpxpy it refuses document types, bounds sizes and keeps line numbers.
@@ -48,8 +48,8 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the track of a GPX file.
 
     Arguments and errors are the same for all readers, see `LogFormat.read`. If the mission file states the time scale
-    utc, times need no zone. If there are several tracks, the mission file may choose one by its name or number. If it
-    does not, `Log.tracks` contains all tracks that can be read, and the unreadable tracks are ignored.
+    `utc`, times may omit the time zone. If there are several tracks, the mission file may choose one by its name or
+    number. If it does not, `Log.tracks` contains all tracks that can be read, and the unreadable tracks are ignored.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")

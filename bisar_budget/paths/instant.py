@@ -121,7 +121,7 @@ def has_leap_second(day: int) -> bool:
 
 
 def gps_week(instant: Instant) -> int:
-    """Number of the GPS week at an instant of UTC, counted from 1980 without rollover."""
+    """GPS week number at an instant of UTC, counted from 1980 without rollover."""
     return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH_DAY) // 7
 
 

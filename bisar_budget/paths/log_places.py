@@ -1,4 +1,4 @@
-"""Checks and conversions of the fixes in a log of any format: time scale, heights, rising times, plausible motion."""
+"""Checks and conversions of fixes, for all log formats: time scale, heights, ascending times, plausible motion."""
 
 import re
 from bisect import bisect_left
@@ -59,16 +59,16 @@ def most_left_out(count: int) -> int:
 
 
 class LogRecords:
-    """Records of a log that have a fix, with their line or number for messages, and which of them are usable.
+    """Records of a log that have a fix, with their line or number for messages, and a mask of the usable records.
 
     Parameters
     ----------
     name : str
         Name of the file in messages.
     count : int
-        Number of records that are read.
+        Number of records that could be read.
     lines : (count,) array_like, optional
-        Lines of the records in the file, rising. If omitted, records are numbered from 1.
+        Lines of the records in the file, in ascending order. If omitted, records are numbered from 1.
     broken : mapping, optional
         Messages about records that cannot be read, by their lines or numbers. They are not among the `count` records.
     lost : int
@@ -107,11 +107,11 @@ class LogRecords:
         return int(self.is_usable.argmax())
 
     def where(self, index: int) -> str:
-        """Beginning of a message about a record: the name of the file, and the record's line or number."""
+        """Prefix of a message about a record: the name of the file, and the line or number of the record."""
         return f"{self.name}{':' if self._is_in_lines else ': record '}{self._numbers[index]}"
 
     def words(self, index: int) -> str:
-        """Name of a record within the sentence of a message, such as `line 12` or `record 12`."""
+        """Text that refers to a record in a message, such as `line 12` or `record 12`."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
     def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
@@ -125,7 +125,7 @@ class LogRecords:
             )
 
     def keep_what_rises(self, times: Floats, start: Instant | None) -> None:
-        """Leave out records so that the remaining times (count,) rise strictly; times count from `start`. [s]"""
+        """Drop records to make `times` (count,) strictly ascending; they are counted from `start`. [s]"""
         indices = np.flatnonzero(self.is_usable)
         usable_times = times[indices]
         steps = np.diff(usable_times)
@@ -171,7 +171,7 @@ class LogRecords:
         return LeftOut(before, tuple(self._faults[number] for number in numbers))
 
     def left_out_words(self) -> str:
-        """Note on how many records are left out, and on their lines or numbers; empty if all records are used."""
+        """Note with the number of records that are left out, and their lines or numbers; empty if all are used."""
         if not self._faults:
             return ""
         numbers = sorted(self._faults)
@@ -180,9 +180,9 @@ class LogRecords:
         return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
 
     def _add(self, faults: Mapping[int, str], count: int) -> None:
-        """Note `count` further records as left out; raises `PathFileError` if there are now too many.
+        """Add `count` records to the records that are left out; raises `PathFileError` if there are now too many.
 
-        `faults` are messages about these records by line or number, or about the first of them.
+        `faults` are messages, by line or number, about all of these records or about the first ones.
         """
         self._faults |= faults
         unusable = len(self._faults) - len(faults) + count + self._lost
@@ -194,9 +194,9 @@ class LogRecords:
 
 
 def _longest_rise(times: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) that selects the longest rising subsequence of times (n,).
+    """Mask (n,) that selects the longest strictly increasing subsequence of times (n,).
 
-    If times are equal, only the first of them may belong to it.
+    The subsequence can contain only the first of several equal times.
     """
     rises = np.ones(len(times), dtype=bool)
     highest = np.maximum.accumulate(times)
@@ -229,9 +229,9 @@ def _longest_rise(times: Floats) -> NDArray[np.bool_]:
 
 
 def _whole_seconds(times: Floats, start: Instant | None) -> str:
-    """Explanation of repeated times for a message: the recorder has truncated all times to whole seconds.
+    """Explanation of repeated times, for a message: the recorder truncates times to whole seconds.
 
-    The text is empty if the times do not look like that.
+    The text is empty if the times do not indicate such a truncation.
     """
     seconds = times + (start.seconds if start else 0.0)
     fixes_per_stamp = len(times) / max(len(np.unique(times)), 1)
@@ -262,7 +262,7 @@ def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
 def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float:
     """Instance (number) of the receiver whose fixes are read: the one that the mission file chooses, or the only one.
 
-    `counts` has the number of fixes by instance. Raises `PathFileError` if the chosen instance has no fix, or if
+    `counts` is the number of fixes of each instance. Raises `PathFileError` if the chosen instance has no fix, or if
     there are several instances and no choice.
     """
     listed = ", ".join(f"{instance:g} with {count}" for instance, count in sorted(counts.items()))
@@ -305,7 +305,7 @@ def scale_words(start: Instant, scale: str) -> str:
 def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights above the ellipsoid") -> None:
     """Refuse a mission file that states a geoid separation for a log that does not need it.
 
-    `log_words` is the reason for the message.
+    `log_words` is the reason why the log does not need it, for the message.
     """
     if keys.geoid_separation is not None:
         raise PathFileError(
@@ -345,9 +345,9 @@ def needs_separation(problem: str) -> PathFileError:
 def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats | None:
     """One-sigma errors (n, 3) east, north, up from a horizontal and a vertical accuracy. [m]
 
-    A horizontal accuracy (n,) does not state a direction. The error may lie along one axis, so it is used for the
-    east and for the north axis. If only one of the two accuracies is known, it is used for all axes. A number that is
-    not positive is unknown. Returns None if no number is positive.
+    A horizontal accuracy (n,) has no direction. The whole error may lie along one axis, so the accuracy is used for
+    both the east and the north axis. If only one of the two accuracies is known, it is used for all axes. Numbers
+    that are not positive count as unknown. Returns None if no number is positive.
     """
     if horizontal is None:
         horizontal = vertical
@@ -387,10 +387,10 @@ def geodetic_log(
 ) -> Log:
     """Make a log from geodetic coordinates: latitude, longitude [rad], height above the ellipsoid [m], each (n,).
 
-    `words` describes the log for reports. Times (n,) count from `start`, an instant in the time scale `scale`, a key
-    of `SCALES`. [s] Without `start` they count from an unknown instant. `sigmas` (n, 3) are one-sigma errors east,
-    north, up. [m] Records with impossible coordinates, or with a time that does not rise, are left out. Raises
-    `PathFileError` if too many are left out.
+    `words` describes the log for reports. `times` (n,) are counted from `start`, an instant in the time scale
+    `scale`, which is a key of `SCALES`. [s] Without `start`, they are counted from an unknown instant. `sigmas` (n,
+    3) are one-sigma errors east, north, up. [m] Records with impossible coordinates, or with times out of order, are
+    left out. Raises `PathFileError` if too many records are left out.
     """
     latitude, longitude, height = coordinates
     for name, values, limit_deg, limit_words in (
@@ -433,10 +433,10 @@ def usable_log(
     sigmas: Floats | None = None,
     geodetic: Sequence[Floats] | None = None,
 ) -> Log:
-    """Make a log from the usable records whose times rise.
+    """Make a log from the usable records whose times are in ascending order.
 
-    `positions_of` is a function from a mask (n,) to the positions (m, 3) [m] of the m records that it selects.
-    `clock_words` is a text about the accuracy of the times. `geodetic` are latitude, longitude and height of each
+    `positions_of` is a function that returns the positions (m, 3) [m] of the m records selected by a mask (n,).
+    `clock_words` is a note on the accuracy of the times. `geodetic` are latitude, longitude and height of each
     record, if the log has them. The other parameters are as in `geodetic_log`.
     """
     start_utc = None if start is None else utc_of(start, scale)
@@ -466,7 +466,7 @@ def usable_log(
 
 
 def counted(number: int, noun: str = "fix") -> str:
-    """A number followed by its noun, in the plural if needed."""
+    """Format a number and a noun, in the plural if needed."""
     return f"{number} {noun}" + ("" if number == 1 else "es" if noun.endswith("x") else "s")
 
 
@@ -489,7 +489,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Parameters
     ----------
     times : (n,) ndarray
-        Slow times, rising; fixes far outside the stretch are ignored. [s]
+        Slow times, in ascending order; fixes far outside the stretch are ignored. [s]
     positions : (n, 3) ndarray
         Positions of the fixes in any axes. [m]
     stretch_s : float
@@ -500,10 +500,10 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Raises
     ------
     PathFileError
-        The log has one of three faults. First, all fixes in the stretch are the same to 1 mm. Second, a fix is
-        repeated for a time in which the platform, at its mean speed, moves by more than 0.1 m. Third, a step between
-        two fixes differs too much from the median of the seven steps around it: by more than 0.1 m, by more than an
-        acceleration of 3 g can cause, and by more than 20 times the median of such differences.
+        The log has one of three faults. First, all fixes in the stretch are equal to within 1 mm. Second, a fix is
+        repeated for so long that the platform, at its mean speed, moves by more than 0.1 m in this time. Third, a
+        step between two fixes differs too much from the median of the seven steps around it: by more than 0.1 m, by
+        more than an acceleration of 3 g can cause, and by more than 20 times the median of such differences.
     """
     half = stretch_s / 2 * (1 + 1e-9)
     first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
@@ -526,7 +526,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
 def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: str) -> None:
     """Refuse a log that repeats a fix while the platform moves.
 
-    `extent` is the distance that the platform moves in the whole time of the fixes. [m]
+    `extent` is the distance that the platform moves over the whole duration of the fixes. [m]
     """
     is_repeated = np.linalg.norm(np.diff(positions, axis=0), axis=1) <= _SAME_FIX_M
     if not is_repeated.any():
@@ -547,7 +547,7 @@ def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: st
 
 
 def _hold_to_small_steps(times: Floats, positions: Floats, half: float, name: str) -> None:
-    """Refuse a step between neighbouring fixes that is too large for the steps around it."""
+    """Refuse a log in which a step between neighbouring fixes is too large, compared with the steps around it."""
     steps = np.diff(times)
     velocities = np.diff(positions, axis=0) / steps[:, None]
     padded = np.pad(velocities, ((_NEIGHBOUR_STEPS, _NEIGHBOUR_STEPS), (0, 0)), mode="reflect")

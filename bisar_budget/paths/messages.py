@@ -1,6 +1,6 @@
-"""Helpers to read files of orbits and logs: texts, times, numbers, and XML as a tree of elements with their lines.
+"""Helpers to read orbit files and logs: text, times, numbers, and XML as a tree of elements with line numbers.
 
-XML files may come from strangers, so no reference is followed, and no entity is expanded.
+XML files may come from untrusted sources, so references are not followed, and entities are not expanded.
 """
 
 import math
@@ -24,7 +24,7 @@ _DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
     """Refuse a file larger than `MAX_MARKUP_BYTES`.
 
-    The message advises the user to keep only the needed part of the file; `part` says what, such as "objects".
+    The message advises the user to keep only the needed part of the file. `part` names this part, such as "objects".
     """
     if size > MAX_MARKUP_BYTES:
         raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
@@ -59,7 +59,7 @@ def epoch_in(text: str) -> Instant | None:
 
 
 def number_in(text: object) -> float | None:
-    """Convert a text or a number to a float; None if it is not a finite number."""
+    """Convert a string or a number to a float; None if it is not a finite number."""
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         return None
     if isinstance(text, str):
@@ -74,9 +74,10 @@ def number_in(text: object) -> float | None:
 
 
 def coordinate_in(text: str, location: str, requirement: str) -> float:
-    """Read a coordinate of a position or velocity from a text.
+    """Read a coordinate of a position or velocity from a string.
 
-    Raises `PathFileError` with the message `requirement` if the text is no number, or a number beyond 1e9.
+    Raises `PathFileError` with the message `requirement` if the string is not a number, or if its magnitude exceeds
+    1e9.
     """
     number = number_in(text)
     if number is None or abs(number) > _MAX_COORDINATE_LEVEL:
@@ -103,7 +104,7 @@ _Candidate = TypeVar("_Candidate", bound=_Named)
 
 
 def object_key(text: str) -> str:
-    """Form of a name or number for comparisons: lower case, no extra spaces, no leading zeros of a number."""
+    """Normalise a name or number for comparisons: lower case, no extra spaces, no leading zeros of a number."""
     text = " ".join(text.split()).casefold()
     return text.lstrip("0") or "0" if text.isdecimal() and text.isascii() else text
 
@@ -113,9 +114,9 @@ def one_object(
 ) -> Sequence[_Candidate]:
     """Select the blocks of a file that are about one object: the object with a given name, or the only object.
 
-    A block is an element set or a segment of an ephemeris. The last of an object's `names` is unique to the object,
-    and `number` is what messages call this name. Raises
-    `PathFileError` if there is no such object, or if there are several.
+    A block is an element set or a segment of an ephemeris. The last of an object's `names` is unique to the object;
+    `number` is the term for this name in messages. Raises `PathFileError` if there is no such object, or if there are
+    several.
     """
     if object_name is not None:
         key = object_key(object_name)

@@ -9,7 +9,7 @@ above the ellipsoid. Sentences may be mixed with other lines, and may follow oth
 from one talker.
 
 A sentence with a wrong or missing checksum is left out and counted. A DTM sentence of this kind is left out only if
-the talker has another DTM sentence with a right checksum. GST states one-sigma errors of latitude, longitude and
+the talker has another DTM sentence with a correct checksum. GST states one-sigma errors of latitude, longitude and
 height. Some receivers state only the semi-major axis of the horizontal error ellipse. DTM states the datum, which has
 to be W84. Without a date, the times of fixes are times of day.
 
@@ -65,7 +65,7 @@ _GST_REACH_S = 5.0  # largest time from a fix to a GST that applies to it; recei
 
 
 class _Quality(NamedTuple):
-    """Quality of a fix as the receiver states it: a text for reports, and the usual one-sigma error. [m]
+    """Quality of a fix as the receiver states it: a text for reports, and the typical one-sigma error. [m]
 
     The text begins with the kind of sentence that states the quality.
     """
@@ -117,7 +117,7 @@ class _Fix(NamedTuple):
 
 
 class _Accuracy(NamedTuple):
-    """A GST sentence: its line, second of the day, and one-sigma errors east, north and up, NaN if unknown. [m]
+    """A GST sentence: line, second of the day, and one-sigma errors east, north and up [m]; NaN for unknown errors.
 
     `unusable` is the number of values in the sentence that are not valid errors.
     """
@@ -198,7 +198,7 @@ class _Sentences:
     unusable: Counter[str]
 
     def talker_of_fixes(self, keys: LogKeys, name: str) -> str:
-        """Talker whose fixes are read: the talker that the mission file chooses, or the only talker with fixes."""
+        """Talker whose fixes are read: the talker named in the mission file, or else the only talker with fixes."""
         counts = Counter[str]()
         for (talker, _), fixes in self.fixes.items():
             counts[talker] += len(fixes)
@@ -227,17 +227,17 @@ class _Sentences:
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
-        """Talkers, other than the given one, that have fixes.
+        """Talkers with fixes, except the given talker.
 
-        They are other receivers. So the datums and accuracies that they state do not apply to the given talker.
+        They are separate receivers, so the datums and accuracies that they state do not apply to the given talker.
         """
         return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
 
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse a log whose datum is not WGS-84.
 
-        The datums count that the talker states, or that talkers without fixes state. The latter are further names of
-        the same receiver.
+        The datums stated by the talker are checked, and also the datums stated by talkers without fixes, which are
+        further names of the same receiver.
         """
         # DTM sentences with a wrong checksum count if a talker has no others: without them, WGS-84 would be assumed.
         datums = {**self.doubtful_datums, **self.datums}
@@ -255,7 +255,7 @@ class _Sentences:
     def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
         """Refuse GGA and GNS sentences whose positions come from two different solutions.
 
-        If the solutions agree, each fix of `kind` gets the worse quality of the two sentences with its time.
+        If the solutions agree, each fix of `kind` gets the worse quality of the two sentences for the same time.
         """
         other_kind = next(candidate for candidate in _FIX_SENTENCES if candidate != kind)
         fixes, counterparts = self.fixes[talker, kind], self.fixes[talker, other_kind]
@@ -298,11 +298,11 @@ class _Sentences:
         )
 
     def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
-        """Dates that a talker states, each with its line; the dates of all talkers if this talker states none."""
+        """Dates that a talker states, each with its line; the dates of all talkers if it does not state a date."""
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """Errors that a talker states in GST sentences, or else those that talkers without fixes state.
+        """GST sentences of a talker, or else the GST sentences of all talkers without fixes.
 
         A talker without fixes is another name of the same receiver.
         """
@@ -310,15 +310,15 @@ class _Sentences:
         return self.accuracies.get(talker) or sorted(gst for speaker in speakers for gst in self.accuracies[speaker])
 
     def unusable_words(self, talker: str) -> str:
-        """Note on the number of invalid values in GST sentences; empty if there are none.
+        """Note with the number of invalid values in GST sentences; empty if all values are valid.
 
-        Sentences of the talker count, and sentences of talkers without fixes.
+        The sentences of the talker are counted, and also the sentences of talkers without fixes.
         """
         count = sum(self.unusable[speaker] for speaker in self.unusable.keys() - self.other_receivers(talker))
         return f", {counted(count, 'figure')} of accuracy that cannot be used left out" if count else ""
 
     def lost_words(self) -> str:
-        """Note on the number of sentences with a wrong checksum or an invalid date; empty if there are none."""
+        """Note with the number of sentences with a wrong checksum or an invalid date; empty if all are valid."""
         lost, undated = self.lost.total(), len(self.undated)
         words = f", {counted(lost, 'sentence')} with a wrong checksum left out" if lost else ""
         return words + (f", {counted(undated, 'sentence')} without a date that there is left out" if undated else "")
@@ -388,7 +388,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
 
 
 def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys) -> Log:
-    """Make a log from a talker's fixes of one kind of sentence, GGA or GNS."""
+    """Make a log from the fixes of a talker in sentences of one kind, GGA or GNS."""
     fixes, dates = sentences.fixes[talker, kind], sentences.dates_for(talker)
     records = LogRecords(
         name,
@@ -426,11 +426,10 @@ def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys
 def _sigmas(
     times: Floats, stated: Sequence[_Accuracy], dates: Sequence[tuple[int, Instant]], middle: float
 ) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of fixes at rising times, from GST sentences. [m]
+    """One-sigma errors (n, 3) east, north, up of fixes at ascending times, from GST sentences. [m]
 
-    A fix gets the larger one of two errors: from the GST sentence before it, and from the one after it. A sentence
-    more than 5 s from the fix is ignored. An error is NaN if no sentence states it. Returns None if no fix has an
-    error.
+    Each error of a fix is the larger of the errors in the GST sentences before and after the fix. Sentences more than
+    5 s from the fix are ignored. An error is NaN if no sentence states it. Returns None if no fix has an error.
     """
     if not stated:
         return None
@@ -452,8 +451,8 @@ def _dated(
 ) -> tuple[Floats, Floats]:
     """Modified Julian days of fixes, and their seconds of the day.
 
-    A fix is within half a day of the last date before it, or of the first date if there is none before it. Without
-    any dates, days are counted from the day of `middle`, a second of the day in the middle of the log.
+    A fix is assumed to be within half a day of the last date before it, or of the first date if no date precedes it.
+    Without any dates, days are counted from the day of `middle`, the second of the day in the middle of the log.
     """
     seconds = np.array([fix.seconds for fix in fixes])
     if not dates:
@@ -467,7 +466,7 @@ def _dated(
 def _checked_fields(sentence: str) -> list[str]:
     """Split a sentence into its fields; raises `ValueError` if the checksum is missing or wrong.
 
-    The result is that of pynmea2, in a tenth of the time.
+    The result is the same as from pynmea2, but takes a tenth of the time.
     """
     match = _CHECKED.fullmatch(sentence)
     if match is None or reduce(xor, match[1].encode()) != int(match[2], 16):
@@ -476,7 +475,7 @@ def _checked_fields(sentence: str) -> list[str]:
 
 
 def _unchecked_fields(sentence: str) -> list[str]:
-    """Split a sentence into its fields without a check of its checksum; 14 empty fields are appended."""
+    """Split a sentence into its fields without verifying the checksum; 14 empty fields are appended."""
     return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
@@ -509,7 +508,7 @@ def _metres(text: str, unit: str, where: str) -> float:
 def _fix(
     fields: Sequence[str], where: str, line: int, quality: _Quality | None, height: Sequence[str]
 ) -> _Fix | None:
-    """Make a fix from the fields of a sentence; None if `quality` is None, which means that there is no position.
+    """Make a fix from the fields of a sentence; None if `quality` is None, which means that it has no position.
 
     `height` has four fields: height, unit of the height, geoid separation, and unit of the separation.
     """

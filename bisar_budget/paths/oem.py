@@ -58,7 +58,7 @@ _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 class CovarianceBlock:
     """A covariance as written in a message: line, epoch, frame, and the rows of its lower triangle.
 
-    An empty frame means the reference frame of the positions and velocities.
+    If `frame` is empty, the reference frame is the same as for positions and velocities.
     """
 
     line: int
@@ -78,7 +78,7 @@ class _EphemerisBlock:
     metadata : mapping
         Line number and value of each keyword in the metadata.
     rows : sequence
-        Line number, epoch and numbers of each sample, as texts.
+        Line number of each sample, with its epoch and its numbers as strings.
     covariances : sequence of CovarianceBlock
         Covariances of the segment.
     """
@@ -97,8 +97,8 @@ def read_oem(
     Arguments and errors are the same for all readers, see `OrbitFormat.read`.
 
     If the message states no interpolation, Hermite's polynomial of degree 7 is used, or Lagrange's polynomial of
-    degree 7 if the velocities do not agree with the positions. Lagrange's polynomial of degree n goes through n + 1
-    samples, and Hermite's through half that number.
+    degree 7 if the velocities do not agree with the positions. A polynomial of degree n goes through n + 1 samples if
+    it is Lagrange's, and through (n + 1)/2 samples if it is Hermite's.
 
     `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
@@ -202,10 +202,10 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
 def read_covariance(
     block: CovarianceBlock, time: Instant, frame: str, orientation: Orientation, name: str
 ) -> EpochCovariance:
-    """Convert a covariance of a CCSDS message from texts in km and km/s to numbers in m and m/s.
+    """Convert a covariance of a CCSDS message from strings in km and km/s to numbers in m and m/s.
 
-    `time` is its epoch in TAI. `frame` is the reference frame of the message, which applies if the covariance states
-    none.
+    `time` is the epoch of the covariance in TAI. `frame` is the reference frame of the message, which is used if the
+    covariance does not state a frame.
     """
     location = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
@@ -237,7 +237,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Note for reports that a message states no interpolation or no degree; empty if it states both."""
+    """Note for reports on a message without a stated interpolation or degree; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
@@ -289,7 +289,7 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
-    """Convert the text of a time in the time system `system` to an instant of TAI."""
+    """Convert a time, given as a string in the time system `system`, to an instant of TAI."""
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # A leap second is part of the last minute of its day.
@@ -362,7 +362,8 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
 def _add_to_covariances(covariances: list[CovarianceBlock], number: int, line: str, name: str) -> None:
     """Read a line between COVARIANCE_START and COVARIANCE_STOP, and add it to the covariances.
 
-    It is an epoch, which begins a covariance, or a frame or a row of the triangle of the last covariance.
+    The line contains an epoch, which begins a new covariance, or a frame or a row of the triangle of the last
+    covariance.
     """
     key, equals, value = (piece.strip() for piece in line.partition("="))
     if key == "EPOCH" and equals:
@@ -399,7 +400,7 @@ def _matrix(matrix: MessageElement) -> CovarianceBlock:
 
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
-    """Covariance from texts by keyword: CX_X, CY_X, CY_Y, … for its elements. An empty text counts as missing."""
+    """Covariance from strings by keyword, such as CX_X, CY_X, CY_Y, …; empty strings count as missing."""
     rows: list[tuple[int, Sequence[str]]] = [
         (line, [leaves[key] for key in keywords if leaves.get(key)]) for keywords in _TRIANGLE_KEYWORDS
     ]

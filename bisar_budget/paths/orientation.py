@@ -1,4 +1,4 @@
-"""Orientation of the Earth relative to the stars: sidereal time, precession and nutation, UT1 and polar motion.
+"""Orientation of the Earth in inertial space: sidereal time, precession and nutation, UT1 and polar motion.
 
 UT1 - UTC and polar motion come from tables that the IERS issues every week. UT1 - UTC is kept below 0.9 s. An error
 of 1 ms turns the Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. If
@@ -41,8 +41,8 @@ class Orientation(NamedTuple):
         Position of the pole, x towards Greenwich and y towards 90° west. [rad]
     ut1_doubt, pole_doubt : float
         Largest errors of UT1 - UTC [s] and of the pole [rad]. The defaults apply if no values are known. The default
-        of `ut1_doubt` is 0.1 s, an example that reports mention in a warning. The default of `pole_doubt` is the
-        largest distance that the pole reaches.
+        of `ut1_doubt`, 0.1 s, is an example value for the warning in reports. The default of `pole_doubt` is the
+        largest displacement of the pole.
     day : int, optional
         Day of UTC to which UT1 - UTC belongs, so that UT1 has no jump at a leap second. None means any day.
     is_predicted : bool
@@ -69,7 +69,7 @@ class Orientation(NamedTuple):
         return instant.after(self.ut1_minus_utc + leaps)
 
     def misplaced(self, position: Vector) -> tuple[float, float]:
-        """Largest errors of a position due to `ut1_doubt` and to `pole_doubt`. [m]"""
+        """Largest position errors due to `ut1_doubt` and due to `pole_doubt`. [m]"""
         turned = ROTATION_RATE_RAD_PER_S * self.ut1_doubt * math.hypot(position[0], position[1])
         return turned, self.pole_doubt * math.hypot(*position)
 
@@ -86,7 +86,7 @@ def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNK
 
 
 def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
-    """Convert a position to Earth-fixed axes from axes that turn with the Earth, with z along the pole of rotation.
+    """Convert a position to Earth-fixed axes from axes that rotate with the Earth and have z along the rotation axis.
 
     The rotation is R₁(-y)·R₂(-x) for the coordinates x, y of the pole [rad] (IERS Conventions, 5.1).
     """
@@ -100,8 +100,8 @@ def sidereal_time(ut1: Instant) -> float:
     """Greenwich mean sidereal time as defined by the IAU in 1982. [rad]
 
     Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (also Aoki and others,
-    1982). The term of 876600 hours per century in the equation is one turn per day. It is computed from the seconds
-    of the day, because the equation as written would have a rounding error of 1e-7 s.
+    1982). The term of 876600 hours per century in the equation is one revolution per day. It is computed from the
+    seconds of the day, because direct evaluation of the equation would have a rounding error of 1e-7 s.
     """
     centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY_S) / _CENTURY_DAYS
     at_midnight = (ut1.day - _J2000_DAY - 0.5) / _CENTURY_DAYS
@@ -116,12 +116,11 @@ def sidereal_time(ut1: Instant) -> float:
 def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
     """Return a function that converts positions from celestial to Earth-fixed axes.
 
-    The celestial axes are those of the GCRF, or with `is_j2000` of the mean equator and equinox of J2000.
+    The celestial axes are the axes of the GCRF, or the mean equator and equinox of J2000 if `is_j2000` is set.
 
-
-    Precession follows the IAU 2006 and nutation the IAU 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
-    differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. Positions are wrong by
-    this amount if a file calls the GCRF `EME2000`.
+    Precession follows the IAU 2006 model, and nutation the IAU 2000A model (IERS Conventions 2010, chapter 5). The
+    axes of J2000 differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. Positions
+    are wrong by this amount if a file calls the GCRF `EME2000`.
 
     Raises
     ------
@@ -165,10 +164,10 @@ _ACCEPTED_TABLES = "accepted: finals2000A.all or .csv of the IERS, its C04, or E
 
 
 class _TableRow(NamedTuple):
-    """A row of a table, which belongs to one day.
+    """A row of a table, with the values for one day.
 
-    `cells` are the texts of the MJD, x of the pole, y of the pole and UT1 - UTC. Each of the last three is followed
-    by the text of its error, which may be empty.
+    `cells` are the strings of the MJD, x of the pole, y of the pole and UT1 - UTC. Each of the last three is followed
+    by the string of its error, which may be empty.
     """
 
     line: int
@@ -182,27 +181,28 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
     The table may be finals2000A, or finals of the IAU 1980, each as the daily or the complete file in fixed columns.
     It may also be finals2000A.all.csv, C04 of any series, or EOP-All.csv of CelesTrak. Between two days the
-    orientation is interpolated linearly. Tides of less than a day, of 0.03 ms and 0.5 mas, are not in the table.
-    `ut1_doubt` and `pole_doubt` are the errors that the rows state. For predictions they grow to a few ms in a month.
+    orientation is interpolated linearly. Tidal variations with periods below one day, of 0.03 ms and 0.5 mas, are not
+    in the table. `ut1_doubt` and `pole_doubt` are the errors stated in the rows. For predictions they grow to a few
+    ms within a month.
 
     Parameters
     ----------
     data : bytes
         The bytes of the file.
     name : str
-        The file in messages.
+        Name of the file in messages.
     instant : Instant
         Middle of the aperture.
 
     Raises
     ------
     PathFileError
-        The file is no such table, or has no values for the day of the instant or for the next day.
+        The file is not such a table, or has no values for the day of the instant or for the next day.
 
     Notes
     -----
-    The values of Bulletin B are used if a row has them, and otherwise those of Bulletin A. UT1 - TAI is interpolated,
-    because UT1 - UTC jumps at a leap second.
+    The values of Bulletin B are used if a row has them, and otherwise the values of Bulletin A. UT1 - TAI is
+    interpolated, because UT1 - UTC jumps at a leap second.
     """
     first: list[float] | None = None
     first_day = last_day = None
@@ -233,7 +233,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
 
 def _rows(text: str, name: str) -> Iterator[_TableRow]:
-    """Yield the rows of a table that have values. The first lines of the table decide which format is read."""
+    """Yield the rows of a table that have values; the format of the table is recognised from its first lines."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     header = lines[0][1].strip() if lines else ""
     if header.lower().startswith(("<!doctype", "<html", "<?xml")):
@@ -258,7 +258,7 @@ _MAX_HEADER_LINES = 40  # lines of text above the rows of C04
 
 
 def _unreadable_table(text: str) -> str | None:
-    """Name, for a message, of a known kind of Earth rotation table that cannot be read.
+    """Name of a kind of Earth rotation table that is recognised but not supported, for a message.
 
     Returns None for any other text.
     """
@@ -285,7 +285,7 @@ def _of_finals(lines: Sequence[tuple[int, str]]) -> Iterator[_TableRow]:
 
 
 def _is_empty(cells: Sequence[str]) -> bool:
-    """Whether a row has a date and no values, as rows for days too far in the future have."""
+    """Whether a row has a date but no values, like the rows for days too far in the future."""
     return bool(cells[0]) and not any(cells[1:])
 
 
@@ -355,9 +355,9 @@ def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> 
 def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list[float]:
     """Numbers of a row: MJD, then x and y of the pole [arcsec] and UT1 - UTC [s], each followed by its error.
 
-    If the row states no errors, usual errors are used. For predictions these grow with the time since
-    `last_measured`, the last day with measured values. Raises `PathFileError` for a cell that is no number, and for
-    values that are not possible.
+    If the row states no errors, typical errors are used. For predictions these grow with the time since
+    `last_measured`, the last day with measured values. Raises `PathFileError` for a cell that is not a number, and
+    for impossible values.
     """
     numbers: list[float] = []
     is_stated = any(row.cells[n] for n in (2, 4, 6))
@@ -392,7 +392,7 @@ def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list
 def _between(first: list[float], second: list[float], fraction: float) -> Orientation:
     """Orientation interpolated linearly between the rows of two successive days.
 
-    The rows are numbers as from `_numbers`. `fraction` is the elapsed part of the first day, from 0 to 1.
+    `first` and `second` are rows as returned by `_numbers`. `fraction` is the elapsed fraction of the first day.
     """
     leaps = tai_less_utc(int(second[0])) - tai_less_utc(int(first[0]))
     change = [end - start for start, end in zip(first, second, strict=True)]

@@ -34,10 +34,10 @@ class OrbitFormat(NamedTuple):
         Name of the XML element that identifies the format; empty for a format that is not XML.
     read : callable
         Reader. Its arguments are the bytes of a file, the name of the file in messages, the name of the object
-        (needed if there are several), the middle of the aperture, and the orientation of the Earth, with which
-        celestial axes are converted to Earth-fixed axes. Returns an `Orbit`. Raises `PathFileError` if the file
-        breaks its format, if it has several objects and no name is given, if it has no object with the given name, or
-        if it has no position at the middle of the aperture.
+        (needed if there are several), the middle of the aperture, and the orientation of the Earth, which is used to
+        convert celestial axes to Earth-fixed axes. Returns an `Orbit`. Raises `PathFileError` if the file breaks its
+        format, if it has several objects and no name is given, if it has no object with the given name, or if it has
+        no position at the middle of the aperture.
     """
 
     words: str
@@ -92,7 +92,7 @@ _EXAMINED_BYTES = 4096  # at the beginning of a file, which identify its format
 
 
 def orbit_format(data: bytes) -> str | None:
-    """Recognise an orbit format from the content of a file; return its key in `ORBIT_FORMATS`, or None."""
+    """Recognise the orbit format of a file from its content; return the key in `ORBIT_FORMATS`, or None."""
     beginning = data[:_EXAMINED_BYTES].removeprefix(b"\xef\xbb\xbf")
     if is_markup(beginning):
         names = re.findall(rb"<(?:\w+:)?(\w+)[\s>]", beginning)
@@ -101,9 +101,9 @@ def orbit_format(data: bytes) -> str | None:
 
 
 def hold_to_format(data: bytes, name: str, form: str) -> None:
-    """Refuse a file that is not an orbit in the format `form`, but in another known format.
+    """Refuse a file that is in a known format other than the orbit format `form`.
 
-    The message names the key of the mission file that reads this other format.
+    The message names the key of the mission file for the actual format, if there is such a key.
     """
     actual = orbit_format(data)
     if actual == form:
@@ -116,22 +116,22 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 
 def hold_to_log(data: bytes, name: str) -> None:
-    """Refuse a file that is an orbit, or has a known format that cannot be read, instead of a flight log.
+    """Refuse a file that is not a flight log, but an orbit, or a file in a known format that cannot be read.
 
-    The message names the key of the mission file that reads it, if there is one.
+    The message names the key of the mission file for the actual format, if there is such a key.
     """
     _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
 
 
 def _words_of_logs() -> str:
-    """List of all log formats in words, each with its name in the mission file."""
+    """Description of all log formats, each with its name in the mission file."""
     return ", ".join(f"{format.words} ({key})" for key, format in LOG_FORMATS.items())
 
 
 def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
-    """Refuse a file that is an orbit in the format `actual`, or has a known format that cannot be read.
+    """Refuse a file that is an orbit in the format `actual`, or that has a known format that cannot be read.
 
-    `actual` is a key of `ORBIT_FORMATS`, or None if the file is no orbit. `accepted` describes what is accepted.
+    `actual` is a key of `ORBIT_FORMATS`, or None if the file is not an orbit. `accepted` describes what is accepted.
     """
     if actual is not None:
         key = f"orbit: {{{actual}: …}} reads it"
@@ -172,7 +172,7 @@ class LogFormat(NamedTuple):
     words : str
         Name of the format for messages.
     endings : tuple of str
-        Usual endings of file names in this format.
+        Usual extensions of file names in this format.
     is_format : callable
         Function that tests whether bytes are a file in this format.
     read : callable
@@ -205,16 +205,16 @@ _KEYS_OF_FORMATS = {
 
 
 def log_format(data: bytes) -> str | None:
-    """Recognise a log format from the content of a file; return its key in `LOG_FORMATS`, or None."""
+    """Recognise the log format of a file from its content; return the key in `LOG_FORMATS`, or None."""
     return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_format(data)), None)
 
 
 def read_log(data: bytes, name: str, stated_format: str | None, keys: LogKeys) -> Log:
     """Read a flight log in the format that the mission file states.
 
-    If `stated_format` is None, the format follows from the content, or else from the ending of the name. The other
-    arguments are those of `LogFormat.read`. Raises `PathFileError` for content of another format, for content that is
-    not recognised as a log, and for faults that the reader finds.
+    If `stated_format` is None, the format is recognised from the content, or else from the extension of the name. All
+    further arguments are the same as for `LogFormat.read`. Raises `PathFileError` for content of another format, for
+    content that is not recognised as a log, and for faults that the reader finds.
     """
     actual = log_format(data)
     if actual is None and is_accuracy(data):

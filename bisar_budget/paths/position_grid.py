@@ -1,9 +1,9 @@
 """Rounding of the fixes in a log to a grid, which limits how well a position is known for any receiver.
 
 A log writes degrees, minutes and metres with a fixed number of decimals. The grid is the coarsest decimal step on
-which all fixes lie. It is found from the numbers alone: zeros at the end of a cell are not evidence. A step counts as
-a grid only if the fixes deviate from a smooth path by about the rounding error of the step. This is needed because
-fixes of a simulated platform that is at rest, or has a round speed, lie on a coarse grid by chance.
+which all fixes lie. It is found from the numbers alone; trailing zeros in a cell are not used as evidence. A step
+counts as a grid only if the fixes deviate from a smooth path by about the rounding error of the step. This is needed
+because fixes of a simulated platform that is at rest, or has a round speed, lie on a coarse grid by chance.
 """
 
 import math
@@ -32,12 +32,12 @@ def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float
     Parameters
     ----------
     times : (n,) ndarray
-        Rising times. [s]
+        Times, in ascending order. [s]
     values : (n,) ndarray
         Values of the coordinate. [SI]
     units : sequence of float
-        Sizes of the units in which the log may write the coordinate. [SI] A decimal step is a unit times a power of
-        ten.
+        Sizes of the units in which the coordinate may be written in the log. [SI] A decimal step is a unit times a
+        power of ten.
     """
     stride = -(-len(values) // _MAX_FIXES)
     values, times = values[::stride], times[::stride]

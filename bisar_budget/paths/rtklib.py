@@ -55,7 +55,7 @@ _MAX_RTKLIB_SIGMA_M = 1e5
 
 
 class _Columns(NamedTuple):
-    """Layout of the lines in a solution, as its header names the columns.
+    """Layout of the lines in a solution, according to its header.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the fixes in a solution of RTKLIB of at most `MAX_SOLUTION_BYTES` bytes.
 
     Arguments and errors are the same for all readers, see `LogFormat.read`. The log has standard deviations of
-    each fix east, north and up, unless the file has none or only zeros.
+    each fix east, north and up, unless they are missing or all zero in the file.
     """
     hold_to_bytes(data, MAX_SOLUTION_BYTES, name)
     header: _Columns | None = None
@@ -141,7 +141,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _header(text: str, location: str) -> _Columns | None:
-    """Read the columns that a header line, which begins with %, names; None for any other line."""
+    """Read the columns from a header line, which begins with %; None for any other line."""
     match = _HEADER_LINE.match(" ".join(text.split()))
     if match is None:
         return None
@@ -169,7 +169,7 @@ def _header(text: str, location: str) -> _Columns | None:
 def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
     """Read a line with a fix; return its modified Julian day and its numbers.
 
-    The numbers are those of all cells, with 0 for the two cells of the time. The seconds of the day are appended.
+    There is a number for each cell, which is 0 for the two cells of the time. The seconds of the day are appended.
     """
     cells = (text.replace(header.delimiter, " ") if header.delimiter else text).split()
     if len(cells) != header.width:
@@ -205,7 +205,7 @@ def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
 
 @lru_cache(maxsize=64)
 def _day(text: str) -> int | None:
-    """Convert a date like 2026/06/01 to a modified Julian day; None if the text is no date."""
+    """Convert a date like 2026/06/01 to a modified Julian day; None if the text is not a date."""
     match = _DATE_PATTERN.fullmatch(text)
     instant = parse_instant("{}-{}-{}T00:00:00Z".format(*match.groups())) if match else None
     return None if instant is None else instant.day
@@ -256,9 +256,9 @@ def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floa
 
 
 def _qualities(table: Floats, header: _Columns) -> str:
-    """Text with the four most frequent qualities and the number of fixes of each.
+    """Text with the four most frequent qualities, and the number of fixes with each quality.
 
-    The text is empty if the solution has no column of the quality.
+    The text is empty if the solution has no quality column.
     """
     if "Q" not in header.indices:
         return ""
@@ -275,8 +275,9 @@ def _sigmas(
 ) -> Floats | None:
     """Standard deviations (n, 3) of the fixes east, north, up; None if the file has none, or only zeros. [m]
 
-    A zero means unknown. If the file states standard deviations of x, y, z, these are converted to east, north, up
-    with the covariances. For each covariance the file states the square root of its absolute value, with its sign.
+    A zero means unknown. Standard deviations of x, y, z are converted to east, north, up, with the covariances taken
+    into account. The file states each covariance as the square root of its absolute value, with the sign of the
+    covariance.
     """
     is_turned = "sdx(m)" in header.indices
     names = ("sdx(m)", "sdy(m)", "sdz(m)") if is_turned else ("sde(m)", "sdn(m)", "sdu(m)")

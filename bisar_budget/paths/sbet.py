@@ -7,8 +7,8 @@ of 10 doubles: time; one-sigma (RMS) errors of position north, east, down [m], o
 heading [arcmin].
 
 Source: the tables of both files in Applanix' POSPac MMS user guide. The wander frame follows from the heading in the
-file: minus the wander angle, it is the true heading. So x points west of north by the wander angle, y is 90° west of
-x, and z points up. `test_a_real_flight_has_the_wander_frame` checks this against a flight.
+file: the true heading is this heading minus the wander angle. So x points west of north by the wander angle, y is 90°
+west of x, and z points up. `test_a_real_flight_has_the_wander_frame` checks this against a flight.
 """
 
 import math
@@ -76,7 +76,7 @@ class _Kind(NamedTuple):
     fields : tuple
         Fields that are checked: name, index in a record, smallest and largest value, and unit of each.
     nonzero_fields : int
-        Number of doubles at the beginning of a record that are not all zero in a usable record.
+        Number of doubles at the beginning of a record, which must not all be zero in a usable record.
     """
 
     words: str
@@ -98,7 +98,7 @@ _SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SMRMSG_FIELDS, 4)
 class Accuracy:
     """One-sigma errors of position [m] and velocity [m/s], east, north and up.
 
-    Each error is the largest one in a number of `records`.
+    Each error is the maximum over a number of `records`.
     """
 
     position: Vector
@@ -107,14 +107,14 @@ class Accuracy:
 
 
 def of_gps(week: int, seconds: float) -> Instant:
-    """Instant in GPS time from a GPS week, counted from 1980 without rollover, and the seconds of the week."""
+    """Instant in GPS time, from the GPS week (counted from 1980 without rollover) and the seconds of the week."""
     return Instant(GPS_EPOCH_DAY + 7 * week, 0.0).after(seconds)
 
 
 def is_sbet(data: bytes) -> bool:
     """Whether a file is an SBET.
 
-    The records of 17 doubles at its beginning and end have to be possible for a flight.
+    The records of 17 doubles at its beginning and end must be plausible for a flight.
     """
     return _looks_like(data, _SBET)
 
@@ -122,15 +122,15 @@ def is_sbet(data: bytes) -> bool:
 def is_accuracy(data: bytes) -> bool:
     """Whether a file is the accuracy file of an SBET.
 
-    The records of 10 doubles at its beginning and end have to be possible, and to have different times.
+    The records of 10 doubles at its beginning and end must be plausible and have different times.
     """
     return _looks_like(data, _SMRMSG)
 
 
 def _looks_like(data: bytes, kind: _Kind) -> bool:
-    """Whether a file consists of records of a kind.
+    """Whether a file appears to consist of records of the given kind.
 
-    Most of its first three and last three records have to be usable. Their first and last time have to differ.
+    Most of the first three and last three records must be usable, and the first and last of their times must differ.
     """
     count = len(data) // kind.size
     if not count or (b"\n" in data[: kind.size] and data[: kind.size].isascii()):
@@ -150,7 +150,7 @@ def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Positions come from latitude, longitude and height. Velocities are converted from the wander frame, and have to
     agree with the positions. Without the key `week` the log has no start, and its times are seconds of the GPS week.
-    Times continue to rise over the end of a week. A leap second within the file is ignored.
+    Times continue to increase past the end of a week. A leap second within the file is ignored.
     """
     hold_to_scale("gps", keys, name)
     hold_to_ellipsoid(keys, name)
@@ -177,10 +177,10 @@ def read_accuracy(
 ) -> Accuracy:
     """Read the accuracy of a trajectory in the aperture from a file of at most `MAX_SBET_BYTES` bytes.
 
-    For each sigma, the largest value in the aperture and next to it is used, see `around_aperture`. `week` is the GPS
-    week of the trajectory. All further arguments are the same as in `slow_times`. Raises `PathFileError`, with the
-    record or byte of the fault, for a damaged file. It is also raised for records that do not cover the aperture,
-    have a gap in it, or state an error of zero throughout.
+    For each sigma, the largest value in or directly next to the aperture is used, see `around_aperture`. `week` is
+    the GPS week of the trajectory. All further arguments are the same as in `slow_times`. Raises `PathFileError`,
+    with the record or byte of the fault, for a damaged file, and for records that do not cover the aperture, have a
+    gap in the aperture, or state an error of zero throughout.
     """
     if is_sbet(data) and not is_accuracy(data):
         raise PathFileError(f"{name}: is an SBET, a trajectory", _ACCEPTED_ACCURACY_FILE, "trajectory.file reads it")
@@ -227,15 +227,15 @@ def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
 
 
 def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: int) -> str:
-    """Text for a message with the name and value of the first field of a record that is outside its range."""
+    """Text with the name and value of the first out-of-range field in a record, for a message."""
     field, column, _, _, unit = kind.fields[int(wrong[:, index].argmax())]
     return f"{field} is {table[index, column]:.6g} {unit}"
 
 
 def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[np.bool_]) -> PathFileError:
-    """Make the error for a file with too many records that are not possible.
+    """Make the error for a file with too many impossible records.
 
-    It names the likely cause, such as another kind of file or other units.
+    The message names the likely cause, such as a different kind of file or different units.
     """
     index = int(wrong.any(axis=0).argmax())
     field, column, *_ = kind.fields[int(wrong[:, index].argmax())]
@@ -252,7 +252,7 @@ def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[
 
 
 def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
-    """Mask (fields, n) of the values in n records that are outside the range of their field."""
+    """Mask (fields, n) that selects the out-of-range values in n records."""
     is_wrong = np.empty((len(fields), len(records)), dtype=bool)
     with np.errstate(invalid="ignore"):
         for index, (_, column, lowest, highest, _) in enumerate(fields):
@@ -263,7 +263,7 @@ def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
 
 
 def _over_weeks(times: Floats, records: LogRecords) -> Floats:
-    """Convert seconds of the GPS week (n,) to times that continue to rise over the end of a week. [s]
+    """Convert seconds of the GPS week (n,) to times that continue to increase past the end of a week. [s]
 
     Times of unusable records are unchanged.
     """

@@ -1,7 +1,7 @@
-"""Orbits in the Extended Standard Product 3 (SP3-a to SP3-d), the format of the GNSS services and of low satellites.
+"""Orbits in the Extended Standard Product 3 (SP3-a to SP3-d), used by GNSS services and for low Earth orbits.
 
-Sources: S. Hilla, The Extended Standard Product 3 Orbit Format (SP3-c), 2010, and SP3-d, 2016, NOAA. A position is
-that of the satellite's centre of mass, in the Earth-fixed axes that the header names.
+Sources: S. Hilla, The Extended Standard Product 3 Orbit Format (SP3-c), 2010, and SP3-d, 2016, NOAA. Positions
+refer to the satellite's centre of mass, in the Earth-fixed axes that the header names.
 """
 
 import math
@@ -102,7 +102,7 @@ def read_sp3(
 
 
 def _first_of(broken: Mapping[int, str]) -> str:
-    """Message for unusable lines: the fault of the first line, and the number of such lines if there are several."""
+    """Message about unusable lines: the fault in the first one, and the number of such lines if there are several."""
     problem = broken[min(broken)]
     return problem if len(broken) == 1 else f"{problem}; {len(broken)} lines cannot be used"
 
@@ -203,7 +203,7 @@ def _id(text: str) -> str:
 def _satellites(
     lines: Sequence[str], header: _Heading, name: str, object_name: str | None = None
 ) -> dict[str, _Satellite]:
-    """Read the samples of all satellites of a file, or of the one with a given name; return them by their names."""
+    """Read the samples of all satellites of a file, or of a named satellite; return the satellites by name."""
     key = None if object_name is None else object_key(object_name)
     satellites: dict[str, _Satellite] = {}
     time: Instant | None = None
@@ -243,7 +243,7 @@ def _satellites(
 
 
 def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: str) -> Instant:
-    """Read the time of an epoch in TAI; refuse an epoch that is not later than the last epoch."""
+    """Read the time of an epoch, in TAI; refuse an epoch that is not later than the last epoch."""
     time = _epoch(line, system, location)
     if last_epoch is not None and time.since(last_epoch) < MIN_SAMPLE_STEP_S:
         raise PathFileError(f"{location}: the epoch is not after the one before it; epochs must rise")
@@ -251,7 +251,7 @@ def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: s
 
 
 def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -> None:
-    """Read a velocity from a line, and add it to the sample `index`, whose position the line before it states."""
+    """Read a velocity from a line, and add it to the sample `index`, whose position is in the line before."""
     if _satellite_of(line, location) != satellite.id:
         raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose position is above it")
     velocity = [speed / 10 for speed in _numbers(line, location, "dm/s")]
@@ -262,7 +262,7 @@ def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -
 def _add_position(
     line: str, time: Instant, number: int, satellites: dict[str, _Satellite], header: _Heading, name: str
 ) -> tuple[_Satellite, int] | None:
-    """Read a position from a line, and add it to its satellite as a sample; return satellite and index of the sample.
+    """Read a position from a line, and add it to the samples of its satellite; return satellite and sample index.
 
     Returns None if the line has no position, or repeats the sample before it.
     """

@@ -5,10 +5,11 @@ Pieces in which the residual still contains motion are halved. So a turn gets sh
 before and after it get long pieces.
 
 Two rules separate motion from noise. First, an information criterion weighs the number of coefficients against the
-number of independent fixes, so that white noise is not fitted. Second, the mean product of neighbouring residuals
-must fall at least with the inverse square of the number of coefficients. Motion due to finite forces meets the second
-rule: even if the acceleration is white noise, the residual in pieces of length h has a variance proportional to h³.
-Slowly varying receiver noise (Gauss-Markov) does not meet it: its residual has a variance proportional to h.
+number of independent fixes, so that white noise is not fitted. Second, as the number of coefficients increases, the
+mean product of neighbouring residuals must fall at least with the inverse square of this number. Motion due to finite
+forces meets the second rule: even if the acceleration is white noise, the residual in pieces of length h has a
+variance proportional to h³. Slowly varying receiver noise (Gauss-Markov) does not meet it: its residual has a
+variance proportional to h.
 """
 
 from collections.abc import Iterable
@@ -29,7 +30,7 @@ _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the larg
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """Values (n, m + `SPLINE_ORDER`) of all B-splines at times (n,), for m pieces whose edges (m + 1,) rise.
+    """Values (n, m + `SPLINE_ORDER`) of all B-splines at times (n,), for m pieces with ascending edges (m + 1,).
 
     The first and the last piece continue beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
@@ -91,7 +92,7 @@ class SplineFit:
     def motion(self) -> Floats:
         """Scalar product of each residual and the next residual, (n - 1,). [m²]
 
-        It shows where the residuals contain motion of the platform: the mean is 0 for white noise, and positive for
+        It shows where the residuals contain motion of the platform: its mean is 0 for white noise, and positive for
         motion.
         """
         return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))

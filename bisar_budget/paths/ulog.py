@@ -1,10 +1,10 @@
 """Logs of the PX4 autopilot (ULog, `.ulg`): fixes of the GPS topic, or the autopilot's estimate of its position.
 
 A ULog consists of messages, each with a size, a type and a payload. Type F states the fields of a topic, type A gives
-a number to a topic, and type D is a record of the topic with a number. The GPS topics are `vehicle_gps_position` and
-`sensor_gps`. They have their own UTC, and heights above the ellipsoid. The topic `vehicle_global_position` has times
-since the start of the autopilot, and gets UTC from a GPS topic. GPS topics and global positions state standard
-deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
+a number to a topic, and type D is a record of the topic with the stated number. The GPS topics are
+`vehicle_gps_position` and `sensor_gps`. They have their own UTC, and heights above the ellipsoid. The topic
+`vehicle_global_position` has times since the start of the autopilot, and gets UTC from a GPS topic. GPS topics and
+global positions state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
 
 Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg and so on, before release
 1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. The package pyulog is a reference in
@@ -62,10 +62,10 @@ _MAX_CLOCK_DRIFT_S = 1.0  # due to jitter of messages; a larger drift means that
 
 
 class _Units(NamedTuple):
-    """Names of the fields of a topic with coordinates, and factors that convert them to degrees and metres.
+    """Names of the coordinate fields of a topic, and factors that convert coordinates to degrees and metres.
 
-    `height` is above the ellipsoid, and `altitude` above mean sea level. GPS topics have two versions of these names
-    and factors.
+    `height` is above the ellipsoid, and `altitude` above mean sea level. For GPS topics there are two versions of
+    these names and factors.
     """
 
     latitude: str
@@ -86,7 +86,7 @@ Records = NDArray[np.void]
 
 
 class _Topic(NamedTuple):
-    """A topic in a log: its name, records, names and units of coordinates, and instance (number) of the receiver."""
+    """A topic in a log: name, records, names and units of the coordinates, and instance (number) of the receiver."""
 
     name: str
     records: Records
@@ -146,7 +146,7 @@ def _count(topic: _Topic) -> int:
 def _with_fixes(topic: _Topic) -> _Topic:
     """Keep only the records of a topic that have a fix.
 
-    Records of a GPS topic also need UTC, which is 0 until the receiver knows it.
+    Records of a GPS topic must also have a UTC, which is 0 until the receiver knows it.
     """
     records = topic.records
     if topic.name in _GPS_TOPICS:
@@ -166,7 +166,7 @@ def _of_gps(gps: _Topic, keys: LogKeys, name: str) -> Log:
 
 
 def _of_global(position: _Topic, gps: _Topic | None, keys: LogKeys, name: str) -> Log:
-    """Make a log from the positions that the autopilot estimates.
+    """Make a log from the positions estimated by the autopilot.
 
     Without a GPS topic, the log has no UTC, and its times are seconds since the start of the autopilot.
     """
@@ -226,7 +226,7 @@ def _log(
 def _topics(data: bytes, name: str) -> list[_Topic]:
     """Read the topics of a log that have positions.
 
-    If a topic has several instances, which are receivers, each instance is a separate element of the list.
+    If a topic has several instances (receivers), each instance is a separate element of the list.
     """
     formats: dict[str, str] = {}
     layouts: dict[str, tuple[np.dtype[np.void], _Units]] = {}
@@ -279,14 +279,14 @@ def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _hold_to_flags(payload: bytes, location: str) -> None:
-    """Refuse a file whose flag message has flags of a newer version of ULog, which cannot be read."""
+    """Refuse a file whose flag message contains flags of a newer ULog version that cannot be read."""
     incompatible = payload[8:16]
     if incompatible[:1] > bytes([_APPENDED_DATA_FLAG_BITS]) or any(incompatible[1:]):
         raise PathFileError(f"{location}: has flags {incompatible.hex()} of a newer kind of ULog")
 
 
 def _layout(topic: str, fields: str, location: str) -> tuple[np.dtype[np.void], _Units]:
-    """NumPy data type of the fields of a topic that are read, and the names and units of its coordinates.
+    """NumPy data type of the required fields of a topic, and the names and units of its coordinates.
 
     `fields` is the text of the format message (F) of the topic.
     """
