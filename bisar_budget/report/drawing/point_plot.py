@@ -52,13 +52,13 @@ _SHEET_CUT_SIZE_PX, _CUT_SIZE_PX = (440.0, 190.0), (300.0, 170.0)
 _LEVEL_LABEL = "level relative to the peak without errors [dB]"
 _PAGE_INCHES = (16.5, 9.2)
 _KEY_HEIGHT_RATIO = 0.22  # of the legend and the colour scale, relative to a row of panels
-_SCENE_AXES = ("east [m]", "north [m]")
+_MAP_AXES = ("east [m]", "north [m]")
 _LOOK_AXES = ("along the look direction x′ [m]", "cross range y′ [m]")
 
 Limits = tuple[float, float, float, float]
 
 
-class _Words(NamedTuple):
+class _PanelText(NamedTuple):
     """A title or an entry of the legend: for readers who do not know the paper, and with the paper's numbers."""
 
     plain: str
@@ -69,23 +69,27 @@ class _Words(NamedTuple):
         return self.paper if is_paper else self.plain
 
 
-_RANGE_ERROR = _Words(
+_RANGE_ERROR_TITLE = _PanelText(
     "Range error over the aperture,\nand three straight lines", "Fig. 3: range error, three segments"
 )
-_INDICATED = _Words(
+_INDICATED_TITLE = _PanelText(
     "Ground points that the three lines indicate:\nthe image smears along them",
     "Fig. 4: points of the segments, (29)\nby {points_by}",
 )
-_BEFORE = _Words("Image with the declared errors,\nbefore autofocus{former}", "Fig. 5: in (x, y), {paper_former}")
-_TURNED = _Words("The same image, rotated:\nany smear is upright{former}", "Fig. 6: in (x′, y′), {paper_former}")
-_FOCUSED = _Words("Rotated image, after autofocus", "Fig. 7: after autofocus")
-_TURNED_BACK = _Words("Image after autofocus,\nrotated back", "Fig. 7 rotated back to (x, y)")
-_CUTS = _Words("Levels along the line through the peak, in cross range", "Cross-range cuts")
-_TARGET = _Words("true position of the target", "position of the target")
-_PREDICTION = _Words("predicted position of its image", "position by (25)")
-_POINTS = _Words("points that the three lines indicate", "points of (29)")
-_PEAK = _Words("peak of the image", "peak of the image")
-_NOT_FORMED = _Words("no image formed", "no image formed")
+_BEFORE_TITLE = _PanelText(
+    "Image with the declared errors,\nbefore autofocus{former}", "Fig. 5: in (x, y), {paper_former}"
+)
+_TURNED_TITLE = _PanelText(
+    "The same image, rotated:\nany smear is upright{former}", "Fig. 6: in (x′, y′), {paper_former}"
+)
+_FOCUSED_TITLE = _PanelText("Rotated image, after autofocus", "Fig. 7: after autofocus")
+_TURNED_BACK_TITLE = _PanelText("Image after autofocus,\nrotated back", "Fig. 7 rotated back to (x, y)")
+_CUTS_TITLE = _PanelText("Levels along the line through the peak, in cross range", "Cross-range cuts")
+_TARGET = _PanelText("true position of the target", "position of the target")
+_PREDICTION = _PanelText("predicted position of its image", "position by (25)")
+_POINTS = _PanelText("points that the three lines indicate", "points of (29)")
+_PEAK = _PanelText("peak of the image", "peak of the image")
+_NOT_FORMED = _PanelText("no image formed", "no image formed")
 
 
 class ImagePanel(NamedTuple):
@@ -148,7 +152,7 @@ class Sheet(NamedTuple):
     cuts: tuple[Curve, ...]
     is_paper: bool = False
 
-    def words(self, words: _Words) -> str:
+    def words(self, words: _PanelText) -> str:
         """Title or entry of the legend for the readers of this sheet."""
         return words.of(is_paper=self.is_paper)
 
@@ -173,7 +177,7 @@ def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
     scene_crop = _bright([images.in_scene, back], peak, images.scene_spacing)
     crop = _bright([images.rotated, images.focused, images.error_free], peak, images.spacing)
 
-    def title_of(words: _Words, name: str = "backprojection") -> str:
+    def title_of(words: _PanelText, name: str = "backprojection") -> str:
         former = "" if name == "backprojection" else f" ({name})"
         return words.of(is_paper=is_paper).format(former=former, paper_former=name)
 
@@ -183,7 +187,7 @@ def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
         level, corners = _interpolated(image, grid[..., :2], region, peak)
         points = (shown_points + predicted)[:, None] + images.points - images.points[middle]
         peaks = shown_points if is_elsewhere else shown_points[:0]
-        axes = ("x [m]", "y [m]") if is_paper else _SCENE_AXES
+        axes = ("x [m]", "y [m]") if is_paper else _MAP_AXES
         return ImagePanel(title, axes, level, corners, true, shown_points + predicted, peaks, points)
 
     def turned(title: str, image: Complexes) -> ImagePanel:
@@ -198,11 +202,11 @@ def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
         points=images.points,
         points_by=images.points_by,
         in_scene=image_panel(
-            title_of(_BEFORE, scene_former), images.in_scene, images.scene_grid, scene_crop, shown_in_scene
+            title_of(_BEFORE_TITLE, scene_former), images.in_scene, images.scene_grid, scene_crop, shown_in_scene
         ),
-        rotated=turned(title_of(_TURNED, image_former), images.rotated),
-        focused=turned(title_of(_FOCUSED), images.focused),
-        rotated_back=image_panel(title_of(_TURNED_BACK), back, images.scene_grid, scene_crop, shown),
+        rotated=turned(title_of(_TURNED_TITLE, image_former), images.rotated),
+        focused=turned(title_of(_FOCUSED_TITLE), images.focused),
+        rotated_back=image_panel(title_of(_TURNED_BACK_TITLE), back, images.scene_grid, scene_crop, shown),
         cuts=_cuts_of(images, images.grid[..., :2] @ turn, crop, peak),
         is_paper=is_paper,
     )
@@ -296,7 +300,8 @@ MarkStyle = dict[str, Any]
 def figure(drawn: Sheet, title: str) -> "Figure":
     """Arrange all panels on one Matplotlib figure: causes and cuts above, images below, then legend and colours."""
     page = new_figure(figsize=_PAGE_INCHES)
-    above, images, key_row = page.subfigures(3, height_ratios=(1, 1.12, _KEY_HEIGHT_RATIO), hspace=0.08)
+    rows = page.add_gridspec(3, 1, height_ratios=(1, 1.12, _KEY_HEIGHT_RATIO), hspace=0.08)
+    above, images, key_row = (page.add_subfigure(rows[index]) for index in range(3))
     panels = [*above.subplots(1, 3), *images.subplots(1, 4)]
     for name, panel in zip(("fig3", "fig4", "cuts", "fig5", "fig6", "fig7", "fig7_back"), panels, strict=True):
         artist = PANELS[name](panel, drawn)
@@ -310,7 +315,7 @@ def figure(drawn: Sheet, title: str) -> "Figure":
 
 def _legend(key: "Axes", drawn: Sheet) -> None:
     """Explain the marks in the images."""
-    styles: list[tuple[MarkStyle, _Words]] = [
+    styles: list[tuple[MarkStyle, _PanelText]] = [
         (_target_mark(_TARGET_COLOR), _TARGET),
         (_prediction_mark(_PREDICTION_COLOR), _PREDICTION),
         ({"ls": "none", "marker": "o", "color": _MARK_COLOR, "ms": 5}, _POINTS),
@@ -519,7 +524,7 @@ def _range_error(panel: "Axes", drawn: Sheet) -> None:
     for segment in drawn.segments:
         panel.plot(*segment.T, "--", color=_MARK_COLOR)
     time_label = "slow time [s]" if drawn.is_paper else "time from mid-aperture [s]"
-    panel.set(title=drawn.words(_RANGE_ERROR), xlabel=time_label, ylabel="range error [mm]")
+    panel.set(title=drawn.words(_RANGE_ERROR_TITLE), xlabel=time_label, ylabel="range error [mm]")
     panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
@@ -528,7 +533,7 @@ def _points(panel: "Axes", drawn: Sheet) -> None:
     panel.plot(0, 0, **_target_mark("#1b7fa3"))
     panel.plot(*drawn.points[1], **_prediction_mark("#2a8f4f"))
     x_label, y_label = drawn.in_scene.axes
-    panel.set(title=drawn.words(_INDICATED).format(points_by=drawn.points_by), xlabel=x_label, ylabel=y_label)
+    panel.set(title=drawn.words(_INDICATED_TITLE).format(points_by=drawn.points_by), xlabel=x_label, ylabel=y_label)
     span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
     low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
     if float(np.hypot(*drawn.points[1])) < 10 * span:  # farther away the three points would coincide in the panel
@@ -624,7 +629,7 @@ def _cuts_drawing(drawn: Sheet, size: tuple[float, float]) -> str:
     ]
     if visible:
         curves = [_within(curve, min(visible), max(visible)) for curve in curves]
-    title = drawn.words(_CUTS)
+    title = drawn.words(_CUTS_TITLE)
     bottom = cut_panel(canvas, 0.0, *size, title, curves)
     return canvas.document((size[0], bottom + 4), "cuts", title, "Power along y′.")
 
@@ -632,8 +637,8 @@ def _cuts_drawing(drawn: Sheet, size: tuple[float, float]) -> str:
 def _within(curve: Curve, low: float, high: float) -> Curve:
     """Part of a cut between two positions. [m]"""
     pairs = zip(curve.positions, curve.levels_db, strict=True)
-    kept = [(position, level) for position, level in pairs if low <= position <= high]
-    return curve._replace(positions=[position for position, _ in kept], levels_db=[level for _, level in kept])
+    visible = [(position, level) for position, level in pairs if low <= position <= high]
+    return curve._replace(positions=[position for position, _ in visible], levels_db=[level for _, level in visible])
 
 
 def _cuts(panel: "Axes", drawn: Sheet) -> None:
