@@ -135,9 +135,9 @@ def gallery() -> None:
     transmitter = platforms.transmitter._replace(motion_error=error)
     displaced = mission._replace(platforms=platforms._replace(transmitter=transmitter))
     paper = simulate_point(mission, image_former="polar_format")
-    (HERE / "section-v-images.png").write_bytes(point_plot.drawn(paper, mission.name, "png"))
+    (HERE / "section-v-images.png").write_bytes(point_plot.drawn(paper, mission.name, "png", is_paper=True))
     sheets = {
-        "paper": sheet(paper),
+        "paper": sheet(paper, is_paper=True),
         "displaced": sheet(simulate_point(displaced)),
         "scene": sheet(simulate_point(mission, targets=parse_targets(SCENE))),
     }

@@ -85,7 +85,10 @@ def verify(
 
 @click.command()
 @click.argument("mission", type=FILE)
-@plot_option("Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
+@plot_option("Draw the range error, the images and their cuts on one sheet: .png, .svg or .pdf.")
+@click.option(
+    "--paper", "is_paper", is_flag=True, help="With --plot: number figures and equations as Rigling & Moses do."
+)
 @output_option("Save the images and their data for NumPy: .npz. Or write the phase history alone: .cphd.")
 @click.option(
     "--image-former",
@@ -104,6 +107,7 @@ def verify(
 def simulate(
     mission: str,
     plot: str | None,
+    is_paper: bool,
     output: str | None,
     image_former: str,
     targets: str | None,
@@ -125,6 +129,8 @@ def simulate(
     is_phase_history = suffix_of(output, (".npz", ".cphd")) == ".cphd"
     if is_phase_history and plot is not None:
         raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")
+    if is_paper and plot is None:
+        raise click.UsageError("--paper changes the titles of --plot, which is missing.")
     spare([mission], [plot, output])
     from bisar_budget.front import imaging
 
@@ -144,7 +150,7 @@ def simulate(
         write_file(output, point_plot.archive(images, changes))
     if plot is not None:
         title = f"{loaded.name} {changes_words(changes)}".rstrip()
-        write_file(plot, point_plot.drawn(images, title, kind))
+        write_file(plot, point_plot.drawn(images, title, kind, is_paper=is_paper))
     deliver(point_plot.summary(images, loaded))
 
 

@@ -30,11 +30,6 @@ class Axis(NamedTuple):
     own: float | None = None
 
     @property
-    def label(self) -> str:
-        """Name and unit of the key."""
-        return f"{self.key} [{self.unit}]" if self.unit else self.key
-
-    @property
     def edges(self) -> Floats:
         """Edges of the cells around the values in a plot, (n + 1,).
 

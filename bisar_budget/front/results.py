@@ -501,11 +501,15 @@ class SimulateResult:
         """Complex image in the axes of the scene, (nx, ny), with x east and y north."""
         return self.images.in_scene
 
-    def plot(self) -> Picture:
-        """Draw the images of this mission in the manner of Figures 3 to 7 of Rigling & Moses."""
+    def plot(self, *, paper: bool = False) -> Picture:
+        """Draw the range error of this mission, its images before and after autofocus, and their cuts.
+
+        If `paper` is True, figures and equations have the numbers of Rigling & Moses, Figures 3 to 7.
+        """
         from bisar_budget.report.drawing.point_plot import drawn
 
-        return Picture(self._mission.name, lambda kind: drawn(self.images, self._mission.name, kind))
+        name = self._mission.name
+        return Picture(name, lambda kind: drawn(self.images, name, kind, is_paper=paper))
 
     def _repr_html_(self) -> str:
         drawn = b64encode(self.plot().of("png")).decode()

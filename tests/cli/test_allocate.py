@@ -11,6 +11,7 @@ import pytest
 from bisar_budget.design.allocate import allocate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing.share_bars import limiting, share_bars
+from bisar_budget.report.words.names import in_words
 from tests.conftest import ROOT, TODAY, mission_text
 
 KEY = "platforms.receiver.motion_error.velocity"
@@ -70,7 +71,7 @@ class TestSheet:
         rows = limiting(sheet)
         assert len(rows) > 1
         for row in rows:
-            assert row.id.replace("_", " ") in texts
+            assert {row.id, in_words(row.id)} <= set(texts)
             assert row.fixed + sum(row.shares.values()) == pytest.approx(1, abs=0.01)
 
     def test_keys_are_those_of_the_file_or_of_the_command(self, run, tmp_path) -> None:

@@ -395,6 +395,7 @@ def test_the_surface_as_it_was_agreed(tmp_path: Path, monkeypatch: pytest.Monkey
     simulated = bb.simulate(mission)
     assert simulated.image.ndim == 2
     simulated.plot()
+    simulated.plot(paper=True)
 
 
 @pytest.mark.parametrize(("seconds", "is_shown"), [(0.9, False), (1.1, True)])

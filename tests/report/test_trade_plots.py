@@ -22,7 +22,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report.drawing.figure import drawing_file
-from bisar_budget.report.drawing.svg import text_width
+from bisar_budget.report.drawing.svg import KEY_FONT_RATIO, text_width
 from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 from bisar_budget.report.drawing.trades import (
     Gathered,
@@ -35,6 +35,7 @@ from bisar_budget.report.drawing.trades import (
     thinned,
 )
 from bisar_budget.report.tables import Described
+from bisar_budget.report.words.names import in_words, key_beside
 from tests.conftest import ROOT, examples
 from tests.drawing import SVG, Drawing
 
@@ -88,14 +89,32 @@ def uses(drawing: Drawing, style: str) -> list[float]:
     return [100 * 10 ** ((limit - y) / decade) for _, y in drawing.line(style)]
 
 
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("collection.aperture_time", "aperture time"),
+        ("platforms.receiver.velocity.1", "receiver velocity y"),
+        ("platforms.receiver.motion_error.velocity", "receiver velocity error"),
+        ("platforms.receiver.motion_error.velocity.1", "receiver velocity error 1"),
+        ("platforms.receiver.motion_error.imu.velocity_random_walk", "receiver IMU velocity random walk"),
+        ("requirements.quadratic_phase_error", "required quadratic phase error"),
+        ("receiver.islr", "receiver ISLR"),
+    ],
+)
+def test_keys_and_ids_are_written_in_words(path: str, words: str) -> None:
+    assert in_words(path) == words
+    assert key_beside(path) == path
+    assert key_beside("utilization") == ""
+
+
 class TestWhatIsDrawn:
     """Arrays before anybody draws them."""
 
     def test_axes_rise_and_are_in_the_unit_asked_for(self) -> None:
         shown = trade(f"{TIME}=2500,500,1500 ms", "radar.bandwidth=150MHz", f"{AZIMUTH}=10,-10deg")
         assert [axis.values.tolist() for axis in shown.axes] == [[500, 1500, 2500], [-10, 10]]
-        assert [axis.label for axis in shown.axes] == [f"{TIME} [ms]", f"{AZIMUTH} [deg]"]
-        assert shown.fixed == ("radar.bandwidth 150 MHz",)
+        assert [(axis.key, axis.unit) for axis in shown.axes] == [(TIME, "ms"), (AZIMUTH, "deg")]
+        assert shown.fixed == ("bandwidth 150 MHz",)
         assert shown.values["utilization"].tolist() == [[0.5, 0.5], [1.5, 1.5], [2.5, 2.5]]
         assert shown.values["worst_row"][:, 0].tolist() == ["first", "first", "second"]
         assert shown.statuses == ["fail", "pass"]
@@ -160,7 +179,8 @@ class TestPlots:
     def test_curves_with_their_limit(self) -> None:
         shown = trade(f"{TIME}=0.5:2.5s:5")
         drawing = drawn(shown, rows={"receiver.velocity.x": np.linspace(0.1, 0.5, 5)})
-        assert {f"{TIME} [s]", "utilization [%]", "worst row", "receiver.velocity.x"} <= set(drawing.texts)
+        assert {"aperture time [s]", TIME, "utilization [%]", "worst row"} <= set(drawing.texts)
+        assert {"receiver velocity x", "receiver.velocity.x"} <= set(drawing.texts)
         assert uses(drawing, "worst") == pytest.approx([50, 100, 150, 200, 250], rel=READ)
         assert uses(drawing, "row0") == pytest.approx([10, 20, 30, 40, 50], rel=READ)
         assert drawing.texts[0] == "Rigling & Moses, Section V"
@@ -201,7 +221,7 @@ class TestPlots:
 
     def test_a_map_of_statuses_names_what_binds(self) -> None:
         drawing = drawn(trade(f"{TIME}=0.1:3s:30", f"{AZIMUTH}=0:90deg:10"))
-        assert {f"{TIME} [s]", f"{AZIMUTH} [deg]"} <= set(drawing.texts)
+        assert {"aperture time [s]", TIME, "receiver azimuth [deg]", AZIMUTH} <= set(drawing.texts)
         assert {"first", "second", "fail", "pass", "utilization 100 %"} <= set(drawing.texts)
         assert 2.05 < 0.1 + 2.9 * drawing.within(drawing.place("second"))[0] < 3
         lowest, highest = drawing.place("0"), drawing.place("80")
@@ -300,7 +320,9 @@ class TestPlots:
         shown = trade(f"{TIME}=0.5:2.5s:5", "allocation.model=published,full", column=column)
         shown.values["utilization"][:, 1] *= 0.5
         drawing = drawn(shown)
-        assert {"published", "full", f"{TIME} [s]"} <= set(drawing.texts)
+        assert {"published", "full", "aperture time [s]", "allocation model:", "allocation.model"} <= set(
+            drawing.texts
+        )
         assert not any("published model" in text for text in drawing.texts)  # none decides for all
         if column is None:
             assert uses(drawing, "row0") == pytest.approx([50, 100, 150, 200, 250], rel=READ)
@@ -367,6 +389,25 @@ class TestPlots:
         assert along == sorted(along)
         assert along[3] / along[0] == pytest.approx(7, rel=1e-3)
         assert np.mean(drawing.lines("solid transmitter")[0], axis=0)[0] == pytest.approx(right, abs=4)
+
+    def test_the_regions_of_a_polar_map_have_letters(self) -> None:
+        """A name would run across other regions; the legend has it in words and by its id."""
+        shown = trade(f"{AZIMUTH}=0:360deg:37", f"{TIME}=1:3s:9", is_polar=True)
+        shown.values["worst_row"][:] = "mission.location_error"
+        texts = drawn(shown, is_polar=True).texts
+        assert texts.count("mission location error") == texts.count("mission.location_error") == 1
+        assert texts.count("A") >= 2
+        assert {"angle: receiver azimuth [deg], radius: aperture time [s]", f"({AZIMUTH}, {TIME})"} <= set(texts)
+
+    def test_the_legend_keeps_words_and_keys_apart(self) -> None:
+        shown = trade(f"{TIME}=0.5:2.5s:5")
+        names = ["receiver.quadratic_phase_error", "transmitter.islr", "receiver.vibration.sinusoidal.0"]
+        drawing = drawn(shown, rows={name: np.linspace(0.1, 0.5, 5) for name in names})
+        for name in names:
+            words, key = drawing.place(in_words(name)), drawing.place(name)
+            assert key[1] == words[1]
+            assert key[0] > words[0] + 0.9 * text_width(in_words(name))
+            assert key[0] + KEY_FONT_RATIO * text_width(name) < float(drawing.root.get("width", ""))
 
     def test_cases_without_a_mission(self) -> None:
         shown = trade(f"{AZIMUTH}=-90:90deg:19", f"{TIME}=1:2s:3")

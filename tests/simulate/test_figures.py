@@ -7,6 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from bisar_budget.cli.images import simulate
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -226,7 +229,7 @@ def test_resampling_reads_a_known_response_to_its_word() -> None:
 class TestDrawing:
     def test_the_figure_draws_the_sheet(self, polar) -> None:
         """Every panel has the sheet's numbers: none transposed, mirrored or stretched on the way to the page."""
-        drawn = sheet(polar)
+        drawn = sheet(polar, is_paper=True)
         page = point_plot.figure(drawn, "title")
         panels = {panel.get_title().split(":")[0]: panel for panel in page.axes}
         curve, *segments = panels["Fig. 3"].lines
@@ -251,14 +254,44 @@ class TestDrawing:
             assert panel.lines[-1].get_xydata() == pytest.approx(picture.true_places)
             assert panel.lines[-2].get_xydata() == pytest.approx(picture.shown_places)
 
+    def test_without_the_paper_no_text_has_its_numbers(self, polar) -> None:
+        """Titles, axes and legend have no figure numbers, equation numbers, x or y; the panels show the same data."""
+        plain, paper = sheet(polar), sheet(polar, is_paper=True)
+        texts = {
+            is_paper: [text.get_text() for text in point_plot.figure(drawn, "title").findobj(Text)]
+            for is_paper, drawn in ((False, plain), (True, paper))
+        }
+        assert not [text for text in texts[False] if re.search(r"Fig\.|\(\d\d\)|\(x|^[xy] \[", text)]
+        assert {"Image with the declared errors,\nbefore autofocus", "east [m]", "north [m]"} <= set(texts[False])
+        assert {"Fig. 3: range error, three segments", "position by (25)", "x [m]"} <= set(texts[True])
+        np.testing.assert_array_equal(plain.in_scene.level_db, paper.in_scene.level_db)
+
+    def test_nothing_on_the_sheet_overlaps(self, moved) -> None:
+        """Titles, labels and the legend are apart, and the panels fill the sheet up to its edges."""
+        page = point_plot.figure(sheet(moved), "title")
+        FigureCanvasAgg(page).draw()
+        boxes = [panel.get_tightbbox() for panel in page.axes if panel.axison]
+        boxes += [panel.get_legend().get_window_extent() for panel in page.axes if panel.get_legend()]
+        for index, box in enumerate(boxes):
+            assert not [other for other in boxes[:index] if Bbox.intersection(box, other)]
+        width, height = page.bbox.size
+        assert min(box.x0 for box in boxes) < 0.02 * width
+        assert max(box.x1 for box in boxes) > 0.98 * width
+        assert min(box.y0 for box in boxes) < 0.02 * height
+
     def test_a_target_that_is_far_away_is_pointed_at(self) -> None:
         error = {"position": [0, 400, 0]}
         images = images_of(mission_text(platforms__transmitter__motion_error=error))
         page = point_plot.figure(sheet(images), "title")
         said = [text.get_text() for panel in page.axes for text in panel.texts]
         away = np.hypot(*images.points[1])
-        assert said.count(f"the target stands {away:.3g} m away") >= 4
+        assert said.count(f"the target is {away:.3g} m away") >= 4
         assert figure_file(page, "svg").decode("utf-8").endswith("</svg>\n")
+
+    def test_the_option_paper_needs_a_plot(self, run) -> None:
+        result = run("simulate", SECTION_V, "--paper")
+        assert result.exit_code == 2
+        assert "--paper changes the titles of --plot, which is missing." in result.stderr
 
     @pytest.mark.parametrize("name", point_plot.PANELS)
     def test_one_panel_by_itself(self, polar, tmp_path, name: str) -> None:

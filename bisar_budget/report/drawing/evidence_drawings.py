@@ -144,7 +144,7 @@ def cut_panel(
     svg.outline(canvas, frame, "grid")
     svg.grid(canvas, frame, across, up)
     svg.y_axis(canvas, frame, up, "power [dB]")
-    bottom = svg.x_axis(canvas, frame, across, "y′ [m]")
+    bottom = svg.x_axis(canvas, frame, across, "cross-range position y′ [m]")
     for curve in curves:
         points = [
             (across.at(position), up.at(level))

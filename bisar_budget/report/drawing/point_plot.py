@@ -1,5 +1,7 @@
-"""Figures 3 to 7 of Rigling & Moses for any mission: their numbers, drawings, files and a summary in words.
+"""Images of a simulated mission and their causes: numbers, drawings, files and a summary in words.
 
+The panels are Figures 3 to 7 of Rigling & Moses for any mission. Their titles and legends are written for readers who
+do not know the paper; an option writes the numbers of the paper's figures and equations instead.
 All coordinates are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of (10),
 rotated about the same centre. A response is at its displaced position, not at the middle of a patch.
 """
@@ -15,6 +17,7 @@ import numpy as np
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.faults import SetValue, changes_words, printable
+from bisar_budget.findings.images import CHIP_FLOOR_DB
 from bisar_budget.mission.model import OTHER_EFFECTS, Mission, Simulation, has_instruments
 from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, WITHOUT_ERROR, Curve, cut_panel
 from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
@@ -44,9 +47,49 @@ _MARK_COLOR, _GRID_COLOR = "#c1502e", "#dddddd"
 _NOT_FORMED_COLOR = "#3a3a3a"  # of a panel beside a narrow patch
 _TARGET_COLOR, _PREDICTION_COLOR, _PEAK_COLOR = "#5fd3f3", "#7CFC9A", "#f5f0a0"
 _PEAK_APART_PIXELS = 2  # cross-range distance from which the position by (25) counts as apart from the peak
-_CUT_SIZE_PX = (300.0, 170.0)  # width of the drawing of the cuts, and height of its frame
+# Width of the drawing of the cuts, and height of its frame: on a sheet, and by itself.
+_SHEET_CUT_SIZE_PX, _CUT_SIZE_PX = (440.0, 190.0), (300.0, 170.0)
+_LEVEL_LABEL = "level relative to the peak without errors [dB]"
+_PAGE_INCHES = (16.5, 9.2)
+_KEY_HEIGHT_RATIO = 0.22  # of the legend and the colour scale, relative to a row of panels
+_MAP_AXES = ("east [m]", "north [m]")
+_LOOK_AXES = ("along the look direction x′ [m]", "cross range y′ [m]")
 
 Limits = tuple[float, float, float, float]
+
+
+class _PanelText(NamedTuple):
+    """A title or an entry of the legend: for readers who do not know the paper, and with the paper's numbers."""
+
+    plain: str
+    paper: str
+
+    def of(self, *, is_paper: bool) -> str:
+        """One of the two texts."""
+        return self.paper if is_paper else self.plain
+
+
+_RANGE_ERROR_TITLE = _PanelText(
+    "Range error over the aperture,\nand three straight lines", "Fig. 3: range error, three segments"
+)
+_INDICATED_TITLE = _PanelText(
+    "Ground points that the three lines indicate:\nthe image smears along them",
+    "Fig. 4: points of the segments, (29)\nby {points_by}",
+)
+_BEFORE_TITLE = _PanelText(
+    "Image with the declared errors,\nbefore autofocus{former}", "Fig. 5: in (x, y), {paper_former}"
+)
+_TURNED_TITLE = _PanelText(
+    "The same image, rotated:\nany smear is upright{former}", "Fig. 6: in (x′, y′), {paper_former}"
+)
+_FOCUSED_TITLE = _PanelText("Rotated image, after autofocus", "Fig. 7: after autofocus")
+_TURNED_BACK_TITLE = _PanelText("Image after autofocus,\nrotated back", "Fig. 7 rotated back to (x, y)")
+_CUTS_TITLE = _PanelText("Levels along the line through the peak, in cross range", "Cross-range cuts")
+_TARGET = _PanelText("true position of the target", "position of the target")
+_PREDICTION = _PanelText("predicted position of its image", "position by (25)")
+_POINTS = _PanelText("points that the three lines indicate", "points of (29)")
+_PEAK = _PanelText("peak of the image", "peak of the image")
+_NOT_FORMED = _PanelText("no image formed", "no image formed")
 
 
 class ImagePanel(NamedTuple):
@@ -89,11 +132,12 @@ class ImagePanel(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """Data of Figures 3 to 7.
+    """Data of all panels.
 
     `segments` (3, 2, 2) are the end points, time [s] and range error [mm], of three straight lines, each of which
     approximates the range error over a third of the aperture. `points` (3, 2) are the image points of these thirds by
-    (29) for a target at the scene centre [m]. `points_by` names the gradients in (29).
+    (29) for a target at the scene centre [m]. `points_by` names the gradients in (29). If `is_paper` is True,
+    titles and legends have the numbers of the paper's figures and equations.
     """
 
     slow_time: Floats
@@ -106,10 +150,18 @@ class Sheet(NamedTuple):
     focused: ImagePanel
     rotated_back: ImagePanel
     cuts: tuple[Curve, ...]
+    is_paper: bool = False
+
+    def words(self, words: _PanelText) -> str:
+        """Title or entry of the legend for the readers of this sheet."""
+        return words.of(is_paper=self.is_paper)
 
 
-def sheet(images: PointImages) -> Sheet:
-    """Compute the numbers of all figures from the images of a mission."""
+def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
+    """Compute the numbers of all panels from the images of a mission.
+
+    If `is_paper` is True, titles and legends have the numbers of the paper's figures and equations.
+    """
     peak = float(np.abs(images.error_free).max())
     cosine, sine = math.cos(images.look_azimuth), math.sin(images.look_azimuth)
     turn = np.array([[cosine, -sine], [sine, cosine]])  # rotation (10), applied from the right
@@ -125,17 +177,22 @@ def sheet(images: PointImages) -> Sheet:
     scene_crop = _bright([images.in_scene, back], peak, images.scene_spacing)
     crop = _bright([images.rotated, images.focused, images.error_free], peak, images.spacing)
 
+    def title_of(words: _PanelText, name: str = "backprojection") -> str:
+        former = "" if name == "backprojection" else f" ({name})"
+        return words.of(is_paper=is_paper).format(former=former, paper_former=name)
+
     def image_panel(
         title: str, image: Complexes, grid: Floats, region: tuple[slice, slice], shown_points: Floats
     ) -> ImagePanel:
         level, corners = _interpolated(image, grid[..., :2], region, peak)
         points = (shown_points + predicted)[:, None] + images.points - images.points[middle]
         peaks = shown_points if is_elsewhere else shown_points[:0]
-        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, shown_points + predicted, peaks, points)
+        axes = ("x [m]", "y [m]") if is_paper else _MAP_AXES
+        return ImagePanel(title, axes, level, corners, true, shown_points + predicted, peaks, points)
 
     def turned(title: str, image: Complexes) -> ImagePanel:
         flat = image_panel(title, image, images.grid, crop, shown)
-        axes = ("x′ [m]", "y′ [m]")
+        axes = ("x′ [m]", "y′ [m]") if is_paper else _LOOK_AXES
         return ImagePanel(title, axes, flat.level_db, *(points @ turn for points in flat[3:]))
 
     return Sheet(
@@ -145,12 +202,13 @@ def sheet(images: PointImages) -> Sheet:
         points=images.points,
         points_by=images.points_by,
         in_scene=image_panel(
-            f"Fig. 5: in (x, y), {scene_former}", images.in_scene, images.scene_grid, scene_crop, shown_in_scene
+            title_of(_BEFORE_TITLE, scene_former), images.in_scene, images.scene_grid, scene_crop, shown_in_scene
         ),
-        rotated=turned(f"Fig. 6: in (x′, y′), {image_former}", images.rotated),
-        focused=turned("Fig. 7: after autofocus", images.focused),
-        rotated_back=image_panel("Fig. 7 rotated back to (x, y)", back, images.scene_grid, scene_crop, shown),
+        rotated=turned(title_of(_TURNED_TITLE, image_former), images.rotated),
+        focused=turned(title_of(_FOCUSED_TITLE), images.focused),
+        rotated_back=image_panel(title_of(_TURNED_BACK_TITLE), back, images.scene_grid, scene_crop, shown),
         cuts=_cuts_of(images, images.grid[..., :2] @ turn, crop, peak),
+        is_paper=is_paper,
     )
 
 
@@ -227,9 +285,12 @@ def _cuts_of(images: PointImages, turned: Floats, region: tuple[slice, slice], p
 
 
 # ---------------------------------------------------------------------- drawn
-def drawn(images: PointImages, title: str, kind: str) -> bytes:
-    """Draw all figures on one sheet. Returns the content of a `png`, `svg` or `pdf` file."""
-    return figure_file(figure(sheet(images), title), kind)
+def drawn(images: PointImages, title: str, kind: str, *, is_paper: bool = False) -> bytes:
+    """Draw all panels on one sheet. Returns the content of a `png`, `svg` or `pdf` file.
+
+    `is_paper` is described in `sheet`.
+    """
+    return figure_file(figure(sheet(images, is_paper=is_paper), title), kind)
 
 
 MarkStyle = dict[str, Any]
@@ -237,37 +298,54 @@ MarkStyle = dict[str, Any]
 
 
 def figure(drawn: Sheet, title: str) -> "Figure":
-    """Arrange all panels on one Matplotlib figure."""
-    page = new_figure(figsize=(16.5, 8))
-    panels = page.subplots(2, 4)
-    for name, panel in zip(("fig3", "fig4", "fig5", "cuts", "fig6", "fig7", "fig7_back"), panels.flat, strict=False):
+    """Arrange all panels on one Matplotlib figure: causes and cuts above, images below, then legend and colours."""
+    page = new_figure(figsize=_PAGE_INCHES)
+    rows = page.add_gridspec(3, 1, height_ratios=(1, 1.12, _KEY_HEIGHT_RATIO), hspace=0.08)
+    above, images, key_row = (page.add_subfigure(rows[index]) for index in range(3))
+    panels = [*above.subplots(1, 3), *images.subplots(1, 4)]
+    for name, panel in zip(("fig3", "fig4", "cuts", "fig5", "fig6", "fig7", "fig7_back"), panels, strict=True):
         artist = PANELS[name](panel, drawn)
-    key = panels[1, 3]
+    key, bar = key_row.subplots(1, 2, width_ratios=(2.4, 1))
     key.axis("off")
-    bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
-    bar.set_label("dB to the error-free peak")
-    styles = [
-        (_target_mark(_TARGET_COLOR), "position of the target"),
-        (_prediction_mark(_PREDICTION_COLOR), "position by (25)"),
-        ({"ls": "none", "marker": "o", "color": _MARK_COLOR, "ms": 5}, "points of (29)"),
-    ]
-    if drawn.in_scene.image_points.size:
-        styles.append((_peak_mark(_PEAK_COLOR), "peak of the image"))
-    marks = [key.plot([], [], label=label, **style)[0] for style, label in styles]
-    key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED_COLOR, labelcolor="white", fontsize=10)
+    page.colorbar(artist, cax=bar, orientation="horizontal").set_label(_LEVEL_LABEL)
+    _legend(key, drawn)
     page.suptitle(printable(title), parse_math=False)  # a $ in a name begins no formula
     return page
+
+
+def _legend(key: "Axes", drawn: Sheet) -> None:
+    """Explain the marks in the images."""
+    styles: list[tuple[MarkStyle, _PanelText]] = [
+        (_target_mark(_TARGET_COLOR), _TARGET),
+        (_prediction_mark(_PREDICTION_COLOR), _PREDICTION),
+        ({"ls": "none", "marker": "o", "color": _MARK_COLOR, "ms": 5}, _POINTS),
+        ({"ls": "none", "marker": "s", "mfc": _NOT_FORMED_COLOR, "mec": "white", "ms": 13}, _NOT_FORMED),
+    ]
+    if drawn.in_scene.image_points.size:
+        styles.append((_peak_mark(_PEAK_COLOR), _PEAK))
+    marks = [key.plot([], [], label=drawn.words(words), **style)[0] for style, words in styles]
+    key.legend(
+        handles=marks,
+        loc="upper left",
+        borderaxespad=0.0,
+        ncols=len(marks),
+        facecolor="black",
+        labelcolor="white",
+        fontsize=10,
+        framealpha=1.0,
+        borderpad=0.9,
+    )
 
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
     """Draw a single small panel for a page. Returns the content of a PNG file; `name` is a key of `PANELS`."""
     if name == "cuts":
-        return drawing_file(_cuts_drawing(drawn), "png", dpi=112)
+        return drawing_file(_cuts_drawing(drawn, _CUT_SIZE_PX), "png", dpi=112)
     page = new_figure(figsize=(4.4, 3.6))
     panel = page.subplots()
     artist = PANELS[name](panel, drawn)
     if artist is not None:
-        page.colorbar(artist, ax=panel, pad=0.02).set_label("dB to the error-free peak")
+        page.colorbar(artist, ax=panel, pad=0.02).set_label(_LEVEL_LABEL)
     return figure_file(page, "png", dpi=80)
 
 
@@ -445,7 +523,8 @@ def _range_error(panel: "Axes", drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
         panel.plot(*segment.T, "--", color=_MARK_COLOR)
-    panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
+    time_label = "slow time [s]" if drawn.is_paper else "time from mid-aperture [s]"
+    panel.set(title=drawn.words(_RANGE_ERROR_TITLE), xlabel=time_label, ylabel="range error [mm]")
     panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
@@ -453,7 +532,8 @@ def _points(panel: "Axes", drawn: Sheet) -> None:
     panel.plot(*drawn.points.T, "o-", color=_MARK_COLOR, zorder=3)
     panel.plot(0, 0, **_target_mark("#1b7fa3"))
     panel.plot(*drawn.points[1], **_prediction_mark("#2a8f4f"))
-    panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
+    x_label, y_label = drawn.in_scene.axes
+    panel.set(title=drawn.words(_INDICATED_TITLE).format(points_by=drawn.points_by), xlabel=x_label, ylabel=y_label)
     span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
     low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
     if float(np.hypot(*drawn.points[1])) < 10 * span:  # farther away the three points would coincide in the panel
@@ -462,7 +542,9 @@ def _points(panel: "Axes", drawn: Sheet) -> None:
         _point_to(panel, np.zeros(2), (low + high) / 2, "black")
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
-    panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
+    panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half))
+    panel.update_datalim([(x - half, y - half), (x + half, y + half)])
+    panel.set_aspect("equal", adjustable="datalim")  # a wide panel shows more than these limits
     panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
@@ -526,24 +608,41 @@ def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
     """Write the distance of a target that is outside the panel, with an arrow towards the target."""
     away = point - middle
     distance = float(np.hypot(*away))
-    panel.text(
-        0.04, 0.04, f"the target stands {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes
-    )
+    panel.text(0.04, 0.04, f"the target is {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes)
     start, tip = (0.5 + fraction * away / distance for fraction in (0.36, 0.47))
     arrow = {"arrowstyle": "-|>", "color": color, "lw": 1.5}
     panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
 
 
-def _cuts_drawing(drawn: Sheet) -> str:
-    """Drawing of the cross-range cuts as SVG, in the style of a report."""
+def _cuts_drawing(drawn: Sheet, size: tuple[float, float]) -> str:
+    """Drawing of the cross-range cuts as SVG, in the style of a report, with the part that is above the floor.
+
+    `size` is the width of the drawing and the height of its frame. [px]
+    """
     canvas = Canvas()
     curves = [*drawn.cuts[1:], drawn.cuts[0]]  # the cut without error is last, so that no line covers it
-    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE_PX, "Cross-range cuts", curves)
-    return canvas.document((_CUT_SIZE_PX[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
+    visible = [
+        position
+        for curve in curves
+        for position, level in zip(curve.positions, curve.levels_db, strict=True)
+        if level > CHIP_FLOOR_DB
+    ]
+    if visible:
+        curves = [_within(curve, min(visible), max(visible)) for curve in curves]
+    title = drawn.words(_CUTS_TITLE)
+    bottom = cut_panel(canvas, 0.0, *size, title, curves)
+    return canvas.document((size[0], bottom + 4), "cuts", title, "Power along y′.")
+
+
+def _within(curve: Curve, low: float, high: float) -> Curve:
+    """Part of a cut between two positions. [m]"""
+    pairs = zip(curve.positions, curve.levels_db, strict=True)
+    visible = [(position, level) for position, level in pairs if low <= position <= high]
+    return curve._replace(positions=[position for position, _ in visible], levels_db=[level for _, level in visible])
 
 
 def _cuts(panel: "Axes", drawn: Sheet) -> None:
-    paint(panel, ElementTree.fromstring(_cuts_drawing(drawn)))
+    paint(panel, ElementTree.fromstring(_cuts_drawing(drawn, _SHEET_CUT_SIZE_PX)))
 
 
 PANELS: dict[str, Callable[["Axes", Sheet], Any]] = {

@@ -7,6 +7,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import RowUse, SpecificationSheet
 from bisar_budget.report.drawing import svg
+from bisar_budget.report.words.names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent
 
 _SHARES_WIDTH_PX = 860.0  # of the drawing
@@ -62,19 +63,22 @@ def share_bars(sheet: SpecificationSheet) -> str:
                     label = str(number) if number else "fixed" if box.right - box.left > 40 else ""
                     canvas.text((box.middle[0], middle + 4), [label], "", "middle")
             start = end
-        canvas.text((frame.left - 8, middle + 4), [svg.short(_name(row), _NAMES_PX - 16)], "axis", "end")
+        canvas.text((frame.left - 8, middle), [svg.short(in_words(row.id), _NAMES_PX - 16)], "axis", "end")
+        canvas.text((frame.left - 8, middle + 11), [svg.short(key_beside(row.id), 1.3 * _NAMES_PX)], "key", "end")
     if not rows:
         canvas.text((frame.middle[0], top + _SHARES_ROW_PX / 2 + 4), ["no limiting row"], "", "middle")
     bottom = svg.x_axis(canvas, frame, along, "share of the usable part of the limit [%]")
     for number, spec in enumerate(sheet.specifications, 1):
         if any(spec.key in row.shares for row in rows):
             bottom += svg.LINE_PX
-            text = f"{number}  {printable(spec.key)}: {printable(spec.text)}"
-            canvas.text((_SHARES_EDGE_PX, bottom), [svg.short(text, _SHARES_WIDTH_PX - 2 * _SHARES_EDGE_PX)], "axis")
-    description = "; ".join(f"{_name(row)} uses {percent(row.used)}" for row in rows)
+            text = f"{number}  {printable(in_words(spec.key))}: {printable(spec.text)}"
+            text = svg.short(text, _SHARES_WIDTH_PX - 2 * _SHARES_EDGE_PX)
+            canvas.text((_SHARES_EDGE_PX, bottom), [text], "axis")
+            after = _SHARES_EDGE_PX + 0.8 * svg.text_width(text) + 14
+            canvas.text((after, bottom), [printable(key_beside(spec.key))], "key")
+    if any(row.fixed for row in rows):
+        bottom += svg.LINE_PX
+        canvas.text((_SHARES_EDGE_PX, bottom), ["fixed: errors that this sheet does not specify"], "axis")
+    description = "; ".join(f"{printable(in_words(row.id))} uses {percent(row.used)}" for row in rows)
     title = f"Shares of the limits: {printable(sheet.name)}"
     return canvas.document((_SHARES_WIDTH_PX, bottom + 12), f"shares {sheet.name}", title, description, _SHARES_STYLE)
-
-
-def _name(row: RowUse) -> str:
-    return printable(row.id.replace("_", " "))

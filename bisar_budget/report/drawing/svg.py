@@ -26,12 +26,14 @@ Mark = TypeVar("Mark")
 
 FONT_PX = 12.0
 LINE_PX = 14.5  # from a line of text to the next
+KEY_FONT_RATIO = 0.72  # width of a key in small, relative to its usual width
 _DARK = "--ink:#e6e6e6;--muted:#a9adb3;--grid:#3a3f46;--paper:#16191d;--transmitter:#7db4f2;--receiver:#f0a06a"
 DRAWING_STYLE = (
     "svg.drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
     "svg.drawing text{fill:var(--ink,#222);paint-order:stroke}"
     "svg.drawing text{stroke:var(--paper,#fff);stroke-width:3px;stroke-linejoin:round}"
     "svg.drawing .small,svg.drawing .axis{font-size:10.5px;fill:var(--muted,#595f66)}"
+    "svg.drawing .key{font-size:8.5px;fill:var(--muted,#595f66)}"
     "svg.drawing .name{font-weight:600}"
     "svg.drawing .sub{font-size:9px}"
     "svg.drawing .line,svg.drawing .transmitter,svg.drawing .receiver"
@@ -454,8 +456,13 @@ def head(canvas: Canvas, lines: Sequence[str]) -> float:
     return 16 + len(lines) * LINE_PX if lines else 10.0
 
 
-def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = ()) -> float:
-    """Write numbers or words and a label below a frame. Returns the bottom of the axis. [px]"""
+def x_axis(
+    canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = ""
+) -> float:
+    """Write numbers or words and a label below a frame, and `key` in small below the label.
+
+    Returns the bottom of the axis. [px]
+    """
     bottom = frame.bottom
     room = (frame.right - frame.left) / max(len(words), 1)
     if any(text_width(word) > room - 4 for word in words):
@@ -471,19 +478,26 @@ def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence
         canvas.lines([((x, bottom), (x, bottom + 4))], "thin")
         canvas.text((x, bottom + 15), [axis_number(value)], "axis", "middle")
     canvas.text((frame.middle[0], bottom + 31), [label], "small", "middle")
-    return bottom + 31
+    if not key:
+        return bottom + 31
+    canvas.text(
+        (frame.middle[0], bottom + 42), [short(key, (frame.right - frame.left) / KEY_FONT_RATIO)], "key", "middle"
+    )
+    return bottom + 42
 
 
-def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = ()) -> None:
-    """Write numbers or words and a label to the left of a frame."""
+def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = "") -> None:
+    """Write numbers or words and a label to the left of a frame, and `key` in small beside the label."""
     for index, word in enumerate(words):
-        canvas.text((frame.left - 6, scale.at(index) + 4), [short(word, frame.left - 24)], "axis", "end")
+        canvas.text((frame.left - 6, scale.at(index) + 4), [short(word, frame.left - 34)], "axis", "end")
     for value in () if words else scale.ticks(_NUMBER_ROOM_PX["y"]):
         y = scale.at(value)
         canvas.lines([((frame.left - 4, y), (frame.left, y))], "thin")
         canvas.text((frame.left - 7, y + 3.5), [axis_number(value)], "axis", "end")
     label = short(label, 1.3 * (frame.bottom - frame.top))
     canvas.upright_text((12, frame.middle[1]), label, "small")
+    if key:
+        canvas.upright_text((23, frame.middle[1]), short(key, (frame.bottom - frame.top) / KEY_FONT_RATIO), "key")
 
 
 def outline(canvas: Canvas, frame: Box, style: str) -> None:
@@ -501,10 +515,14 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 
 
 class LegendLine(NamedTuple):
-    """An entry of a legend: its text, and a function that draws its mark, 25 px wide, to the right of a point."""
+    """An entry of a legend: its text, and a function that draws its mark, 25 px wide, to the right of a point.
+
+    `key` is a key of the mission file or an id, which is written in small behind the text.
+    """
 
     words: str
     mark: Callable[[Point], None]
+    key: str = ""
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
@@ -532,13 +550,17 @@ def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLin
     x, y = _LEGEND_INDENT_PX, top + 20
     for entry in entries:
         lines = wrap(printable(entry.words), _LEGEND_CHARACTERS, max_lines=3, placeholder=" …")
-        room = 44 + _SMALL_FONT_RATIO * max(map(text_width, lines))
+        width_px = _SMALL_FONT_RATIO * text_width(lines[-1])
+        key_room = KEY_FONT_RATIO * text_width(entry.key) + 8 if entry.key else 0.0
+        room = 44 + max(_SMALL_FONT_RATIO * max(map(text_width, lines)), width_px + key_room)
         if x + room > width and x > _LEGEND_INDENT_PX:
             x, y = _LEGEND_INDENT_PX, y + LINE_PX + 3
         entry.mark((x, y - 4))
         for index, line in enumerate(lines):
             y += LINE_PX if index else 0
             canvas.text((x + 31, y), [line], "small")
+        if entry.key:
+            canvas.text((x + 37 + width_px, y), [printable(entry.key)], "key")
         x += room
     return y + 6
 

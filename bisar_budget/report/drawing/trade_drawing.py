@@ -22,6 +22,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.drawing.trades import borders, cell_edges, level_lines, per_word, regions, runs, thinned
+from bisar_budget.report.words.names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent
 
 _TRADE_WIDTH_PX, _TRADE_HEIGHT_PX = 560.0, 270.0  # width of a drawing, height of its frame
@@ -29,7 +30,7 @@ _TRADE_LEFT_PX, _TRADE_RIGHT_PX = 58.0, 12.0  # margins beside the frame
 _MAX_NAMES_PX = 190.0  # width of names at an axis
 _WORD_PX = 24.0  # height of the bar of a word
 _POLAR_RIM_PX = 165.0  # radius of a polar map
-_HEAT_BAR_PX = 70.0  # width of the colour scale beside a map
+_HEAT_BAR_PX = 80.0  # width of the colour scale beside a map
 _SHOWN_USE_PERCENT, _MIN_USE_PERCENT = 10.0, 0.1  # largest and smallest lower end of an axis of utilizations
 _STATUS_OPACITIES = (0.24, 0.13, 0.36)  # of the first, second and third status of one colour
 _CURVE_COLOURS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")
@@ -76,7 +77,7 @@ def trade_drawing(
     top = svg.head(canvas, above)
     by_word = per_word(trade)
     if by_word is not None or (len(trade.axes) == 1 and not trade.axes[0].words):
-        bottom = _curves(canvas, top, trade, rows, by_word[1] if by_word else {})
+        bottom = _curves(canvas, top, trade, rows, *(by_word or (None, {})))
     elif len(trade.axes) == 1:
         bottom = _bars(canvas, top, trade, rows)
     else:
@@ -87,7 +88,7 @@ def trade_drawing(
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
     """Lines above a drawing in a separate file: mission, fixed values, changes by options, and gating model.
 
-    For a polar map, a last line names its angle and radius.
+    For a polar map, two last lines name its angle and radius, in words and by their keys.
     """
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"
@@ -96,8 +97,15 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
     for text, (width, count) in zip((printable(mission.name), subtitle), _HEAD_LINES, strict=True):
         lines += wrap(text, width, max_lines=count, placeholder=" ...")
     if is_polar:
-        lines.append(f"angle: {trade.axes[0].label}, radius: {trade.axes[1].label}")
+        around, radius = trade.axes
+        lines.append(f"angle: {_label(around)}, radius: {_label(radius)}")
+        lines.append(f"({around.key}, {radius.key})")
     return lines
+
+
+def _label(axis: Axis) -> str:
+    """The key of an axis in words, and its unit."""
+    return f"{in_words(axis.key)} [{axis.unit}]" if axis.unit else in_words(axis.key)
 
 
 def _style(trade: Trade) -> str:
@@ -161,11 +169,17 @@ def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLin
 
 # ---------------------------------------------------------------- one key
 def _curves(
-    canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
+    canvas: svg.Canvas,
+    top: float,
+    trade: Trade,
+    rows: Mapping[str, Floats],
+    word_axis: Axis | None,
+    by_word: Mapping[str, Trade],
 ) -> float:
     """Draw curves against a number: utilizations of rows or words with their limit, or the values of a column.
 
-    The background has the colour of the status. Returns the bottom of the drawing. [px]
+    `by_word` are the sweeps of the words of `word_axis`. The background has the colour of the status. Returns the
+    bottom of the drawing. [px]
     """
     first = next(iter(by_word.values())) if by_word else trade
     (axis,) = first.axes
@@ -187,9 +201,12 @@ def _curves(
         canvas.boxes([svg.Box(across.at(low), frame.top, across.at(high), frame.bottom)], f"is-{status}")
     svg.grid(canvas, frame, None, up)
     entries = []
+    if word_axis is not None:
+        entries.append(svg.LegendLine(f"{_label(word_axis)}:", lambda at: None, word_axis.key))
     for word, style, values in curves:
         _curve(canvas, frame, across, up, axis.values, values, style)
-        entries.append(svg.line_entry(canvas, word, style))
+        entry = svg.line_entry(canvas, word if by_word else in_words(word), style)
+        entries.append(entry if by_word else entry._replace(key=key_beside(word)))
     if not trade.column:
         canvas.lines([frame.level(up.at(100.0))], "limit")
         entries.append(svg.line_entry(canvas, "limit", "limit"))
@@ -197,8 +214,9 @@ def _curves(
         canvas.lines([frame.upright(across.at(axis.own))], "at")
         entries.append(svg.line_entry(canvas, "this mission", "at"))
     svg.outline(canvas, frame, "frame")
-    svg.y_axis(canvas, frame, up, trade.heading or ("worst utilization [%]" if by_word else "utilization [%]"))
-    bottom = svg.x_axis(canvas, frame, across, axis.label)
+    use = "worst utilization [%]" if by_word else "utilization [%]"
+    svg.y_axis(canvas, frame, up, trade.heading or use, key=key_beside(trade.column))
+    bottom = svg.x_axis(canvas, frame, across, _label(axis), key=key_beside(axis.key))
     return svg.legend(canvas, bottom, _TRADE_WIDTH_PX, [*entries, *_swatches(canvas, statuses)])
 
 
@@ -250,8 +268,10 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
     drawing. [px]
     """
     (axis,) = trade.axes
-    left = min(max(map(svg.text_width, axis.words)) + 34, _MAX_NAMES_PX)
-    canvas.text((8, top + 8), [svg.short(axis.key, _TRADE_WIDTH_PX)], "small")
+    left = min(max(map(svg.text_width, axis.words)) + 44, _MAX_NAMES_PX)
+    label = in_words(axis.key)
+    canvas.text((8, top + 8), [svg.short(label, _TRADE_WIDTH_PX)], "small")
+    canvas.text((18 + 0.9 * svg.text_width(label), top + 8), [key_beside(axis.key)], "key")
     frame = svg.Box(left, top + 16, _TRADE_WIDTH_PX - _TRADE_RIGHT_PX, top + 24 + _WORD_PX * len(axis.words))
     values = np.asarray(trade.values[trade.column] if trade.column else 100 * trade.values["utilization"], float)
     is_use = not trade.column
@@ -278,13 +298,14 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
         shown = [(along.at(100 * use), down.at(index)) for index, use in enumerate(uses.tolist()) if use > 0]
         for point in filter(frame.holds, shown):
             canvas.circle(point, 3, f"dot{number}")
-        entries.append(svg.circle_entry(canvas, row, 3, f"dot{number}"))
+        entry = svg.circle_entry(canvas, in_words(row), 3, f"dot{number}")
+        entries.append(entry._replace(key=key_beside(row)))
     if axis.own is not None:
         canvas.circle((frame.left + 9, down.at(axis.own)), 5, "own")
         entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, down, "", axis.words)
-    bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]")
+    bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]", key=key_beside(trade.column))
     return svg.legend(canvas, bottom, _TRADE_WIDTH_PX, [*entries, *_swatches(canvas, trade.statuses)])
 
 
@@ -344,7 +365,7 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
     """
     trade = thinned(trade)
     x, y = trade.axes
-    left = min(max(map(svg.text_width, y.words)) + 34, _MAX_NAMES_PX) if y.words else _TRADE_LEFT_PX + 10
+    left = min(max(map(svg.text_width, y.words)) + 44, _MAX_NAMES_PX) if y.words else _TRADE_LEFT_PX + 16
     right = _TRADE_WIDTH_PX - _TRADE_RIGHT_PX - (_HEAT_BAR_PX if trade.column else 0.0)
     frame = svg.Box(left, top, right, top + _TRADE_HEIGHT_PX + 60)
     if geometry is None:
@@ -381,8 +402,9 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
     if geometry is not None:
         return svg.legend(canvas, frame.bottom + 24, _TRADE_WIDTH_PX, entries)
     svg.outline(canvas, frame, "frame")
-    svg.y_axis(canvas, frame, plane.up, y.label, y.words)
-    return svg.legend(canvas, svg.x_axis(canvas, frame, plane.across, x.label, x.words), _TRADE_WIDTH_PX, entries)
+    svg.y_axis(canvas, frame, plane.up, _label(y), y.words, key=key_beside(y.key))
+    bottom = svg.x_axis(canvas, frame, plane.across, _label(x), x.words, key=key_beside(x.key))
+    return svg.legend(canvas, bottom, _TRADE_WIDTH_PX, entries)
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
@@ -437,7 +459,8 @@ def _heat(
         canvas.boxes([svg.Box(left, bottom - step, left + 12, bottom)], f"heat{index}")
     for value in scale.ticks(26.0):
         canvas.text((left + 16, scale.at(value) + 3.5), [svg.axis_number(value)], "axis")
-    canvas.upright_text((_TRADE_WIDTH_PX - 4, frame.middle[1]), svg.short(trade.heading, 420.0), "small")
+    canvas.upright_text((_TRADE_WIDTH_PX - 15, frame.middle[1]), svg.short(trade.heading, 420.0), "small")
+    canvas.upright_text((_TRADE_WIDTH_PX - 4, frame.middle[1]), key_beside(trade.column), "key")
 
 
 def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
@@ -446,10 +469,10 @@ def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines:
     for (i, j), use in np.ndenumerate(trade.values["utilization"]):
         if math.isfinite(use):
             x, y = (columns[i] + columns[i + 1]) / 2, (lines[j] + lines[j + 1]) / 2
-            row = printable(str(trade.values["worst_row"][i, j])).replace(".", ". ")
+            row = printable(in_words(str(trade.values["worst_row"][i, j])))
             canvas.text((x, y - 10), [percent(float(use))], "", "middle")
             for index, line in enumerate(wrap(row, max(max_characters, 5), max_lines=2, placeholder="…")):
-                canvas.text((x, y + 22 + 13 * index), [line.replace(". ", ".")], "small", "middle")
+                canvas.text((x, y + 22 + 13 * index), [line], "small", "middle")
 
 
 def _names(
@@ -457,7 +480,8 @@ def _names(
 ) -> list[svg.LegendLine]:
     """Write the name of the binding row in each region: horizontally, vertically in a tall region, or as a letter.
 
-    Returns legend entries for the letters and for regions without a name.
+    The id of the row is written in small below its name. Regions of a polar map have letters. Returns legend entries
+    for the letters and for regions without a name.
     """
     letters: dict[str, str] = {}
     named = set()
@@ -466,30 +490,36 @@ def _names(
         i, j = region.cell
         p, q = (columns[i] + columns[i + 1]) / 2, (lines[j] + lines[j + 1]) / 2
         x, y = plane.at(p, q)
-        row = printable(region.row)
+        name, row_id = printable(in_words(region.row)), printable(key_beside(region.row))
         named.add(region.row)
-        if plane.middle is not None:  # a name runs towards the middle
-            side = math.cos(p)
-            canvas.text((x, y + 4), [row], "", "start" if side < -0.3 else "end" if side > 0.3 else "middle")
+        half = 0.45 * svg.text_width(name) + 6
+        is_wide = plane.middle is None and region.size[0] * cell[0] >= 2 * half
+        if plane.middle is None and not is_wide and region.size[1] * cell[1] > 2 * half:
+            centre = min(max(y, min(lines) + half), max(lines) - half)
+            canvas.upright_text((x + 4, centre), name, "")
+            canvas.upright_text((x + 15, centre), row_id, "key")
             continue
-        half = 0.45 * svg.text_width(row) + 6
-        if region.size[0] * cell[0] < 2 * half < region.size[1] * cell[1]:
-            canvas.upright_text((x + 4, min(max(y, min(lines) + half), max(lines) - half)), row, "")
+        if not is_wide:
+            name = letters.setdefault(region.row, _REGION_LETTERS[len(letters) % len(_REGION_LETTERS)])
+            canvas.text((x, y + 4), [name], "", "middle")
             continue
-        if region.size[0] * cell[0] < 2 * half:
-            row = letters.setdefault(region.row, _REGION_LETTERS[len(letters) % len(_REGION_LETTERS)])
-            half = 8.0
-        canvas.text((min(max(x, columns[0] + half), columns[-1] - half), y + 4), [row], "", "middle")
+        centre = min(max(x, columns[0] + half), columns[-1] - half)
+        canvas.text((centre, y + 4), [name], "", "middle")
+        canvas.text((centre, y + 15), [row_id], "key", "middle")
     entries = [
-        svg.LegendLine(row, lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"))  # type: ignore[misc]
+        svg.LegendLine(
+            in_words(row),
+            lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"),  # type: ignore[misc]
+            key_beside(row),
+        )
         for row, letter in letters.items()
     ]
     occurring = set(rows.ravel().tolist()) - {""}
     if unnamed := sorted(occurring - named):
-        unnamed_words = f"{', '.join(unnamed[:3])}{' …' * (len(unnamed) > 3)}"
-        entries.append(svg.line_entry(canvas, f"another row binds, in small regions {unnamed_words}", "between"))
+        unnamed_words = f"{', '.join(map(in_words, unnamed[:3]))}{' …' * (len(unnamed) > 3)}"
+        entries.append(svg.line_entry(canvas, f"another row decides, in small regions {unnamed_words}", "between"))
     elif len(occurring) > 1:
-        entries.append(svg.line_entry(canvas, "another row binds", "between"))
+        entries.append(svg.line_entry(canvas, "another row decides", "between"))
     return entries
 
 

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from bisar_budget.arrays import Floats, NumbersOrWords
 from bisar_budget.design.cases import Cases, Values
-from bisar_budget.design.table import Part
+from bisar_budget.design.table import Column, Part
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described
+from bisar_budget.report.words.names import in_words
 
 MAX_PLOT_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
 MAX_ROWS = 7  # rows with a curve each
@@ -71,7 +72,7 @@ class Gathered:
             raise QuestionError(
                 f"--plot-column {column}: is no column of numbers; accepted: {', '.join(number_columns)}"
             )
-        self.column, self.heading = column or "", columns[column].heading if column is not None else ""
+        self.column, self.heading = column or "", _heading(columns[column]) if column is not None else ""
         needed = (*_NEEDED_COLUMNS, *names, *((column,) if column is not None else ()))
         self.pieces: dict[str, list[NumbersOrWords]] = {name: [] for name in needed}
 
@@ -94,9 +95,8 @@ class Gathered:
             axis = self._axis(varied, values)
             orders.append(np.arange(values.size) if axis.words else np.argsort(axis.values))
             if values.size == 1:
-                fixed.append(
-                    f"{varied.key} {axis.words[0] if axis.words else f'{axis.values[0]:.6g} {varied.unit}'}".strip()
-                )
+                value = axis.words[0] if axis.words else f"{axis.values[0]:.6g} {varied.unit}"
+                fixed.append(f"{in_words(varied.key)} {value}".strip())
             else:
                 varying_indices.append(index)
                 rising = axis.values[orders[-1]]
@@ -121,6 +121,11 @@ class Gathered:
         factor, divisor = varied.dimension.scales.get(varied.unit) or (1.0, 1.0)
         own_value = None if varied.value is None else varied.value / factor * divisor
         return Axis(varied.key, varied.unit, shown, scale=factor / divisor, own=own_value)
+
+
+def _heading(column: Column) -> str:
+    """Name of a column in words, and its unit."""
+    return column._replace(name=in_words(column.name)).heading
 
 
 def _is_log(values: Floats) -> bool:
