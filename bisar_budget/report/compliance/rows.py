@@ -32,8 +32,8 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_in, format_quantity
 
-_MAX_LARGEST_ROWS = 8  # contributions in each table of a summary
-_MAX_MATRIX_ROWS = 20  # rows in a summary; the annex has the other rows, with smaller utilizations
+_MAX_LARGEST_ROWS = 6  # contributions in each table of a summary
+_MAX_MATRIX_ROWS = 18  # rows in a summary; the annex has the other rows, with smaller utilizations
 _MAX_BRIEF_ROWS = 8  # rows in the summary of one of several missions
 
 
