@@ -17,7 +17,7 @@ from bisar_budget.phrases import CODES, SENTENCE_TABLES, Note
 from bisar_budget.phrases.notes import COMPOSED
 from bisar_budget.phrases.templates import fields, fill
 from bisar_budget.report import Style, render
-from bisar_budget.report.formats import verification
+from bisar_budget.report.answers import written
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import ROOT, by_turns, findings, found_in, name_of
 
@@ -49,7 +49,7 @@ def test_every_sentence_of_a_verdict_has_its_code(name: str) -> None:
     path = ROOT / "specs" / "missions" / f"{name}.yaml"
     verified = verify_mission(load_mission(str(path)), "mission.*")
     assert verified.rows
-    (mission,) = json.loads(verification.as_json([verified], Style()))["missions"]
+    (mission,) = json.loads(written("verify", "json", [verified], Style()))["missions"]
     for verdict, written in zip(verified.rows, mission["rows"], strict=True):
         codes = [None if reason is None else reason.code for reason in (verdict.reason, verdict.reason_autofocus)]
         assert [written["reason_code"], written["reason_autofocus_code"]] == codes

@@ -59,6 +59,11 @@ def record(page: Page) -> doc.Chapter:
     return doc.Chapter("Document and inputs", blocks, f"{page.anchor}-record")
 
 
+def has_record(page: Page) -> bool:
+    """Whether the record of a mission has more than its mission file, whose SHA-256 is at the head of its chapter."""
+    return bool(page.mission.document.changes) or len(input_files(page.mission)) > 1
+
+
 def _input_line(page: Page, file: InputFile) -> doc.Line:
     shown_name = page.file if file.use == "mission" else file.name.replace("\\", "/")
     return file.use, doc.Styled("id", doc.Name(shown_name)), doc.Styled("digest", file.digest or "not read")

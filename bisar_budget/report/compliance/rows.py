@@ -32,9 +32,9 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_in, format_quantity
 
-_MAX_LARGEST_ROWS = 8  # contributions in each table of a summary
-_MAX_MATRIX_ROWS = 20  # rows in a summary; the annex has the other rows, with smaller utilizations
-_MAX_BRIEF_ROWS = 8  # rows in the summary of one of several missions
+_MAX_LARGEST_ROWS = 6  # contributions in each table of a summary
+_MAX_MATRIX_ROWS = 18  # rows in a summary; the annex has the other rows, with smaller utilizations
+_MAX_BRIEF_ROWS = 6  # rows in the summary of one of several missions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,7 +43,7 @@ class Page:
 
     `file` is the path of the mission file as the report shows it. `anchor` identifies the mission within the report.
     `matrix` are all rows except undeclared errors, worst first. `in_summary` are the ids of the rows that a summary
-    shows.
+    shows. `is_brief` is True for a mission among several, of which the report shows less.
     """
 
     findings: MissionFindings
@@ -54,6 +54,7 @@ class Page:
     matrix: Sequence[Row]
     in_summary: frozenset[str]
     undeclared: Sequence[Row]
+    is_brief: bool = False
 
     @property
     def mission(self) -> Mission:
@@ -105,6 +106,7 @@ def page_of(findings: MissionFindings, style: Style, anchor: str, *, is_brief: b
             if index < most or (STATUS[row.status].is_explained and not is_brief)
         ),
         undeclared=[row for row in findings.rows if row.status == "not_declared"],
+        is_brief=is_brief,
     )
 
 

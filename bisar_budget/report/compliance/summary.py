@@ -21,7 +21,7 @@ from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.compliance.annex import annex
 from bisar_budget.report.compliance.overview import Entry, overview
-from bisar_budget.report.compliance.record import document_facts, record
+from bisar_budget.report.compliance.record import document_facts, has_record, record
 from bisar_budget.report.compliance.rows import (
     Declaration,
     Page,
@@ -276,7 +276,7 @@ def _brief(page: Page) -> list[doc.Block]:
         doc.Chapter("Verdict", list(_verdict(page)), f"{page.anchor}-verdict", is_listed=False),
         doc.Chapter("Compliance matrix", list(_matrix(page)), f"{page.anchor}-matrix", is_listed=False),
         doc.Chapter("Geometry", [_geometry_facts(page)], f"{page.anchor}-geometry", is_listed=False),
-        record(page),
+        *([record(page)] if has_record(page) else []),
         doc.Paragraph(more, "more"),
     ]
 
@@ -366,9 +366,9 @@ def _drivers(page: Page) -> Iterator[Row]:
     """Yield the rows that decide the verdict.
 
     They are the rows that fail, warn, cannot be judged or are waived. If all rows are met, they are the rows with the
-    largest utilization.
+    largest utilization, which a brief page shows only in its matrix.
     """
-    is_met = STATUS[page.findings.status].is_met
+    is_met = STATUS[page.findings.status].is_met and not page.is_brief
     for row in page.judged[:_MAX_DRIVER_ROWS]:
         if not STATUS[row.status].is_met or (is_met and row.utilization):
             yield row
@@ -391,6 +391,7 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
         "times the declared value. The requirement is the one that sets the allowable."
     )
     caption += " The annex has the formulas of each row." if page.is_full else ""
+    caption = "Declared errors and rows with a limit, worst first" if page.is_brief else caption
     shown = [row for row in page.matrix if row.id in page.in_summary]
     yield matrix_table(page, shown, f"Compliance matrix of {page.name}", caption)
     hidden = len(page.hidden)
@@ -408,7 +409,9 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
 
 
 def _geometry_facts(page: Page) -> doc.Facts:
-    return doc.Facts([(name, sentence(text)) for name, text in head(page.findings)], "facts wide")
+    left_out = ("Budget", "Model") if page.is_brief else ()
+    pairs = [(name, sentence(text)) for name, text in head(page.findings) if name not in left_out]
+    return doc.Facts(pairs, "facts wide")
 
 
 def _geometry(page: Page) -> Iterator[doc.Block]:
