@@ -1,8 +1,7 @@
-"""Autofocus of a complex image by phase gradient or map drift, and rotation of a bistatic image before and after it.
+"""Autofocus of a complex image by phase gradient or map drift.
 
 Motion errors smear an image along y′, across the bistatic look direction. Both estimators therefore take an image in
-the rotated frame (x′, y′), with x′ along the first axis. An image in (x, y) is first rotated to that frame and later
-rotated back, as in Section VI of Rigling & Moses.
+the rotated frame (x′, y′), with x′ along the first axis, as in Section VI of Rigling & Moses.
 
 Sources: Wahl, Eichel, Ghiglia & Jakowatz, "Phase Gradient Autofocus - A Robust Tool for High Resolution SAR Phase
 Correction", IEEE Trans. AES 30 (1994); Jakowatz & Wahl, "Eigenvector method for maximum-likelihood estimation of
@@ -23,7 +22,6 @@ from bisar_budget.simulator.phase_history import Complexes, Floats
 Indices = NDArray[np.int64]
 
 _MAX_AUTOFOCUS_ITERATIONS = 40
-_PADDING_FACTOR = 2  # ratio of the sides of padded and given image, so that a rotated image does not wrap around
 _SUPPORT_FRACTION = 0.1  # fraction of the strongest aperture sample; weaker samples are leakage of a finite image
 _MIN_GAP_FRACTION = 0.05  # smallest empty part of the sampling band in an oversampled image
 _BLOCK_ROWS = 16  # range lines that are corrected at once, so that they fit into the cache
@@ -211,46 +209,6 @@ ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
     "pga": phase_gradient_autofocus,
     "map_drift": partial(map_drift, sub_apertures=3),
 }
-
-
-def autofocus_in_scene_axes(
-    image: Complexes, look_azimuth: float, algorithm: Callable[[Complexes], Focused] = phase_gradient_autofocus
-) -> Focused:
-    """Rotate an image from (x, y) to (x′, y′), focus it there, and rotate it back: Section VI of Rigling & Moses.
-
-    Parameters
-    ----------
-    image : (n, n) ndarray
-        Complex image on a square ground grid of equal spacing along x (first axis) and y, as from `ground_grid` with
-        azimuth 0, centred on its sample n // 2. The image must be at baseband. If it still has the phase of the range
-        to each pixel, it has a carrier beyond the sampling band. It must be sampled at least 1.42 times finer than
-        the band requires, because the band rotates with the image.
-    look_azimuth : float
-        φ_b, (11): direction of x′. [rad]
-    algorithm : callable
-        `phase_gradient_autofocus` or `map_drift`.
-
-    Returns
-    -------
-    Focused
-        `image` is in (x, y), (n, n). `phase` (m,) is along y′, in the order of `numpy.fft.fftfreq(m)`. It is
-        estimated in the largest square along x′ and y′ within the image. This square has m samples of the same
-        spacing on a side.
-
-    Raises
-    ------
-    ValueError
-        The image is not square, the azimuth is not finite, or `algorithm` raises a `ValueError`.
-    """
-    image = _checked(image)
-    turned = rotated(image, look_azimuth)
-    side = turned.shape[0]
-    inner = int(image.shape[0] / (abs(math.cos(look_azimuth)) + abs(math.sin(look_azimuth)))) // 2 * 2
-    start = side // 2 - inner // 2
-    phase = algorithm(turned[start : start + inner, start : start + inner]).phase
-    fine = np.interp(np.fft.fftfreq(side), np.fft.fftfreq(inner), phase, period=1.0)
-    back = scene_axes(_corrected(turned, fine), look_azimuth, image.shape[0])
-    return Focused(image=back, phase=phase)
 
 
 def aperture_band(spectrum: Complexes) -> Indices:
@@ -522,80 +480,3 @@ def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int,
         shift = (shift + samples / 2) % samples - samples / 2
         drifts.append(-2 * math.pi * shift / samples)
     return np.array(drifts)
-
-
-# ---------------------------------------------------------------------- rotation
-def rotated(image: Complexes, look_azimuth: float) -> Complexes:
-    """Rotate an image in (x, y) to the frame (x′, y′) of (10), by three shears.
-
-    Each shear is a phase ramp in the spectrum along one axis, computed by FFT. It is therefore exact for a
-    band-limited image.
-
-    Source: Unser, Thévenaz & Yaroslavsky, "Convolution-based interpolation for fast, high-quality rotation of
-    images", IEEE Trans. Image Processing 4 (1995).
-
-    Parameters
-    ----------
-    image : (n, n) ndarray
-        Baseband image with x along the first axis and equal spacing of both axes. It is rotated about sample n // 2
-        of each axis. The result is exact if the spectrum of the image lies within ±0.35 cycles per sample. The
-        shears alias if the spectrum is wider.
-    look_azimuth : float
-        Direction of x′. [rad]
-
-    Returns
-    -------
-    (m, m) ndarray
-        The whole rotated image with a margin of zeros, m = 2 n. It has the same spacing, and its centre is sample
-        m // 2 of each axis.
-
-    Raises
-    ------
-    ValueError
-        The image is not square, or the azimuth is not finite.
-    """
-    if image.ndim != 2 or image.shape[0] != image.shape[1]:
-        raise ValueError(f"rotation takes a square image (got shape {image.shape})")
-    count = image.shape[0]
-    side = _PADDING_FACTOR * count
-    padded = np.zeros((side, side), dtype=complex)
-    start = side // 2 - count // 2
-    padded[start : start + count, start : start + count] = image
-    return _turned(padded, look_azimuth)
-
-
-def scene_axes(image: Complexes, look_azimuth: float, count: int) -> Complexes:
-    """Rotate an image in (x′, y′), made by `rotated`, back to (x, y), and return its middle part (count, count)."""
-    start = image.shape[0] // 2 - count // 2
-    return _turned(image, -look_azimuth)[start : start + count, start : start + count]
-
-
-def _turned(image: Complexes, angle_rad: float) -> Complexes:
-    """Rotate a square image to axes turned by an angle: exact quarter turns, then shears for the remaining angle.
-
-    The remaining angle is at most 45°. A `ValueError` is raised if the angle is not finite.
-    """
-    if not math.isfinite(angle_rad):
-        raise ValueError(f"the look azimuth must be a finite angle (got {angle_rad} rad)")
-    quarters = round(angle_rad / (math.pi / 2))
-    shear_angle = angle_rad - quarters * math.pi / 2
-    for _ in range(quarters % 4):
-        # new(x′, y′) = old(−y′, x′). The first sample of an even side has no counterpart; it is margin.
-        image = np.roll(image.T[:, ::-1], 1, axis=1)
-    # old(x, y) with x = x′cos − y′ sin, y = x′ sin + y′ cos, split into x-, y- and x-shears.
-    image = _sheared(image, -math.tan(shear_angle / 2), axis=0)
-    image = _sheared(image, math.sin(shear_angle), axis=1)
-    return _sheared(image, -math.tan(shear_angle / 2), axis=0)
-
-
-def _sheared(image: Complexes, shear: float, axis: int) -> Complexes:
-    """Shear a square image by FFT: new(u, v) = old(u + shear · v, v), with u along `axis`.
-
-    v is counted from the middle sample of the other axis.
-    """
-    side = image.shape[0]
-    frequency = np.fft.fftfreq(side)
-    across = np.arange(side) - side // 2
-    ramp = np.exp(2j * math.pi * shear * np.outer(frequency, across))
-    moved: Complexes = np.fft.ifft(np.fft.fft(image, axis=axis) * (ramp if axis == 0 else ramp.T), axis=axis)
-    return moved

@@ -24,9 +24,7 @@ _REACH_SAMPLES = 8  # samples on each side that an interpolation uses
 _KAISER_FACTOR = 12.0  # shape of the window; the error is -110 dB for three samples per cell
 _CHIP_UPSAMPLING_FACTOR = 8
 _BLOCK_COLUMNS = 512  # columns that are interpolated at once
-_MAX_ASCENT_STEPS = 50  # steps along x′ and y′ alternately
 _NARROWING_STEPS = 3  # steps after which a row is accurate to a few thousandths
-_PEAK_TOLERANCE_SAMPLES = 1e-4
 _GRID_SEARCH_STEPS = 8  # Newton steps that find a point in a grid
 _GRID_TOLERANCE_PX = 0.02  # pixels; last step of a search that has found its point
 _BLOCK_POINTS = 1 << 16  # read at once
@@ -50,23 +48,6 @@ class ImpulseResponse:
     pslr_db: float
     islr_db: float
     mask_m: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImpulseResponse2D:
-    """Measures of a point response in a small image: two cuts through its interpolated peak, and sidelobe ratios.
-
-    `peak` is the magnitude of the peak. `peak_m` is its position along x′ and y′, relative to the middle sample. [m]
-    `pslr_db` and `islr_db` are the peak and the integrated sidelobe ratio of the full area. [dB] For these ratios the
-    mainlobe is the rectangle given by `mask_m` of both cuts, and the sidelobes are the area outside it.
-    """
-
-    range_cut: ImpulseResponse
-    cross_range_cut: ImpulseResponse
-    peak: float
-    peak_m: tuple[float, float]
-    pslr_db: float
-    islr_db: float
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
@@ -176,73 +157,6 @@ def impulse_response(
     )
 
 
-def impulse_response_2d(
-    chip: Complexes, spacing_m: tuple[float, float], mask_m: tuple[float, float] | None = None
-) -> ImpulseResponse2D:
-    """Measure a point response in a small image: cuts along x′ and y′ through its peak, and its full area.
-
-    Parameters
-    ----------
-    chip : (nx, ny) ndarray
-        Complex samples of the whole response, at least two per resolution cell.
-    spacing_m : (2,) float
-        Distance between samples along x′ and y′. [m]
-    mask_m : (2,) float, optional
-        Half widths of the mainlobe mask, usually from the error-free response. [m] None uses the nulls of this
-        response.
-
-    Returns
-    -------
-    ImpulseResponse2D
-
-    Raises
-    ------
-    ValueError
-        As for `impulse_response`, or the chip is not two-dimensional.
-    """
-    if chip.ndim != 2:
-        raise ValueError(f"a chip has two axes (got shape {chip.shape})")
-    _check(chip)
-    row, column = (float(index) for index in np.unravel_index(np.argmax(np.abs(chip)), chip.shape))
-    for index, count in ((row, chip.shape[0]), (column, chip.shape[1])):
-        if not 2 <= index <= count - 3:
-            raise ValueError("the peak lies at the edge of the chip: centre it")
-    for _ in range(_MAX_ASCENT_STEPS):
-        before = row, column
-        column = _peak(line_at(chip, row))
-        row = _peak(line_at(chip.T, column))
-        if max(abs(row - before[0]), abs(column - before[1])) < _PEAK_TOLERANCE_SAMPLES:
-            break
-    along, across = mask_m or (None, None)
-    range_cut = impulse_response(line_at(chip.T, column), spacing_m[0], along)
-    cross_range_cut = impulse_response(line_at(chip, row), spacing_m[1], across)
-    magnitude = np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T, _CHIP_UPSAMPLING_FACTOR).T)
-    pair = range_cut, cross_range_cut
-    edges = [
-        tuple(_CHIP_UPSAMPLING_FACTOR * (position + sign * cut.mask_m / spacing) for sign in (-1, 1))
-        for position, cut, spacing in zip((row, column), pair, spacing_m, strict=True)
-    ]
-    for size, (lower, upper) in zip(magnitude.shape, edges, strict=True):
-        if lower < 0 or upper > size - 2:
-            raise ValueError("the mainlobe reaches beyond the chip: take a larger one")
-    weights = [_inside(size, *ends) for size, ends in zip(magnitude.shape, edges, strict=True)]
-    energy = float(np.sum(magnitude**2))
-    mainlobe = float(weights[0] @ magnitude**2 @ weights[1])
-    outside = ~np.outer(weights[0] > 0, weights[1] > 0)
-    lines = [_line_at(magnitude, end) * (weights[1] > 0) for end in edges[0]]
-    lines += [_line_at(magnitude.T, end) * (weights[0] > 0) for end in edges[1]]
-    highest = max(float(magnitude[outside].max()), *(float(line.max()) for line in lines))
-    peak = cross_range_cut.peak
-    return ImpulseResponse2D(
-        range_cut=range_cut,
-        cross_range_cut=cross_range_cut,
-        peak=peak,
-        peak_m=((row - chip.shape[0] // 2) * spacing_m[0], (column - chip.shape[1] // 2) * spacing_m[1]),
-        pslr_db=20 * math.log10(highest / peak),
-        islr_db=10 * math.log10((energy - mainlobe) / mainlobe),
-    )
-
-
 def line_at(chip: Complexes, row: float | Floats) -> Complexes:
     """Interpolate the line (ny,) of an image (nx, ny) at a fractional row; rows (n,) give lines (n, ny)."""
     count = chip.shape[0]
@@ -292,29 +206,6 @@ def _check(samples: Complexes) -> None:
         raise ValueError("a response is made of finite samples; these hold NaN or infinity")
     if not np.any(samples):
         raise ValueError("the samples are all zero: there is no response to measure")
-
-
-def _peak(cut: Complexes) -> float:
-    power = np.abs(upsampled(cut, _UPSAMPLING_FACTOR)) ** 2
-    top = int(np.argmax(power))
-    if not 0 < top < power.size - 1:
-        raise ValueError("the peak lies at the edge of the chip: centre it")
-    return (top + _vertex(power, top)) / _UPSAMPLING_FACTOR
-
-
-def _inside(count: int, lower: float, upper: float) -> Floats:
-    """Fraction of the cell of each of `count` samples that lies between two positions, (count,).
-
-    A cell is 1 sample wide and centred on its sample. The positions are in samples.
-    """
-    positions = np.arange(count)
-    return np.asarray(np.clip(np.minimum(positions + 0.5, upper) - np.maximum(positions - 0.5, lower), 0.0, 1.0))
-
-
-def _line_at(magnitude: Floats, row: float) -> Floats:
-    below = math.floor(row)
-    line: Floats = magnitude[below] + (row - below) * (magnitude[below + 1] - magnitude[below])
-    return line
 
 
 def _crossing(magnitude: Floats, top: int, direction: int) -> float:

@@ -50,9 +50,9 @@ def test_every_sentence_of_a_verdict_has_its_code(name: str) -> None:
     verified = verify_mission(load_mission(str(path)), "mission.*")
     assert verified.rows
     (mission,) = json.loads(written("verify", "json", [verified], Style()))["missions"]
-    for verdict, written in zip(verified.rows, mission["rows"], strict=True):
+    for verdict, item in zip(verified.rows, mission["rows"], strict=True):
         codes = [None if reason is None else reason.code for reason in (verdict.reason, verdict.reason_autofocus)]
-        assert [written["reason_code"], written["reason_autofocus_code"]] == codes
+        assert [item["reason_code"], item["reason_autofocus_code"]] == codes
         assert set(codes) <= CODES.keys() | {None}
 
 

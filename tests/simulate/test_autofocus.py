@@ -1,7 +1,6 @@
 """Autofocus against phase errors put on apertures by direct sums, in every kind of scene it may meet."""
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,17 +10,12 @@ from hypothesis import strategies as st
 
 from bisar_budget.simulator.autofocus import (
     aperture_band,
-    autofocus_in_scene_axes,
     map_drift,
     phase_gradient_autofocus,
-    rotated,
-    scene_axes,
 )
-from bisar_budget.simulator.image_formation import backprojection, ground_grid, taylor_window
-from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.image_formation import taylor_window
 from bisar_budget.simulator.phase_history import cell_centres
 from tests.conftest import examples
-from tests.simulate.conftest import Collection, collection
 
 
 def options_id(options) -> str:
@@ -297,95 +291,3 @@ class TestApertureBand:
 
     def test_a_full_band_is_centred(self) -> None:
         assert aperture_band(np.ones((2, 16)))[0] == 8
-
-
-def plane_waves(grid, look_azimuth: float, points, amplitudes, spacing: float, phase):
-    """Image of points on any grid from a tapered band, 0.45 of the sampling, square in the rotated frame."""
-    count = 57  # 0.45 of 128
-    frequency = (np.arange(count) - count // 2) / 128 / spacing
-    turn = taylor_window(count) * np.exp(1j * phase(cell_centres(2.0, count)))
-    axes = np.array(
-        [[math.cos(look_azimuth), math.sin(look_azimuth)], [-math.sin(look_azimuth), math.cos(look_azimuth)]]
-    )
-    pixels = grid[..., :2].reshape(-1, 2) @ axes.T
-    targets = np.asarray(points) @ axes.T
-    along, across = (
-        np.exp(2j * math.pi * np.outer(pixels[:, axis], frequency))
-        @ (shape[:, None] * np.exp(-2j * math.pi * np.outer(frequency, targets[:, axis])))
-        for axis, shape in enumerate((taylor_window(count), turn))
-    )
-    return ((along * across) @ amplitudes).reshape(grid.shape[:2]) / count**2
-
-
-def peak(image) -> float:
-    return float(np.abs(upsampled(upsampled(image, 4).T, 4)).max())
-
-
-class TestSceneAxes:
-    SIDE, SPACING = 128, 0.5
-
-    @classmethod
-    @cache
-    def images(cls, look_azimuth: float) -> list[np.ndarray]:
-        """In the scene's axes and in the rotated ones; and there without a phase error."""
-        rng = np.random.default_rng(8)
-        points = rng.uniform(-16, 16, (8, 2))
-        amplitudes = np.exp(2j * math.pi * rng.random(8))
-        size, shape = (cls.SIDE * cls.SPACING,) * 2, (cls.SIDE,) * 2
-        found = [
-            plane_waves(ground_grid((0, 0), azimuth, size, shape), look_azimuth, points, amplitudes, cls.SPACING, f)
-            for azimuth, f in ((0.0, quadratic), (look_azimuth, quadratic), (look_azimuth, lambda u: 0 * u))
-        ]
-        for one in found:
-            one.setflags(write=False)
-        return found
-
-    @pytest.mark.parametrize("look_azimuth", [0.0, 0.3, math.pi / 4, 1.1, 2.5, -2.0, math.pi, -math.pi / 2])
-    def test_rotation_is_the_image_formed_there(self, look_azimuth: float) -> None:
-        """Exact but for what leaves the image at its border: -40 dB of the peak within the middle half."""
-        in_scene, formed, _ = self.images(look_azimuth)
-        turned = rotated(in_scene, look_azimuth)
-        middle = turned.shape[0] // 2
-        got = turned[middle - 32 : middle + 32, middle - 32 : middle + 32]
-        assert np.abs(got - formed[32:96, 32:96]).max() < 0.01 * np.abs(formed).max()
-        back = scene_axes(turned, look_azimuth, self.SIDE)
-        assert back[32:96, 32:96] == pytest.approx(in_scene[32:96, 32:96], abs=1e-3)
-
-    @pytest.mark.parametrize("look_azimuth", [0.3, math.pi / 4, 1.1, 2.5, -2.0])
-    @pytest.mark.parametrize("algorithm", [phase_gradient_autofocus, map_drift])
-    def test_same_phase_and_peak_as_the_image_formed_there(self, look_azimuth: float, algorithm) -> None:
-        in_scene, formed, clean = self.images(look_azimuth)
-        got, want = autofocus_in_scene_axes(in_scene, look_azimuth, algorithm), algorithm(formed)
-        frequency = np.fft.fftfreq(got.phase.size)
-        inside = np.abs(frequency) < 0.45 / 2 * 0.97
-        there = np.interp(frequency[inside], np.fft.fftfreq(self.SIDE), want.phase, period=1.0)
-        assert rms(frequency[inside], got.phase[inside] - there) < 0.05
-        assert 20 * math.log10(peak(got.image) / peak(want.image)) == pytest.approx(0, abs=0.2)
-        assert 20 * math.log10(peak(got.image) / peak(clean)) == pytest.approx(0, abs=0.2)
-
-    def test_refusals(self) -> None:
-        with pytest.raises(ValueError, match=r"square image \(got shape \(16, 32\)\)"):
-            autofocus_in_scene_axes(np.ones((16, 32), dtype=complex), 0.3)
-        with pytest.raises(ValueError, match="finite angle"):
-            autofocus_in_scene_axes(np.ones((32, 32), dtype=complex), math.nan)
-
-
-def test_section_vi_on_backprojected_images() -> None:
-    """Points in a backprojected image with the carrier taken out, focused in (x, y) as in (x′, y′)."""
-    c: Collection = collection(pulses=160, frequencies=96)
-    points = np.array([[4.0, -7.0, 0.0], [-9.0, 5.0, 0.0], [6.0, 10.0, 0.0]])
-    history = c.record(points, [1, 1j, -1])
-    history.samples[:] *= np.exp(1j * quadratic(cell_centres(2.0, 160)))[:, None]
-    look, size, shape = c.geometry.look_azimuth, (48.0, 48.0), (192, 192)
-
-    def image(azimuth: float):
-        grid = ground_grid((0.0, 0.0), azimuth, size, shape)
-        total = np.zeros(shape)
-        for state in (c.geometry.transmitter, c.geometry.receiver):
-            total += np.linalg.norm(grid - np.asarray(state.position), axis=-1)
-        return backprojection(history, grid) * np.exp(-2j * math.pi / c.wavelength * total)
-
-    here, there = autofocus_in_scene_axes(image(0.0), look), phase_gradient_autofocus(image(look))
-    assert 20 * math.log10(peak(here.image) / peak(there.image)) == pytest.approx(0, abs=0.2)
-    assert 20 * math.log10(peak(here.image)) == pytest.approx(0, abs=0.3)
-    assert peak(image(look)) < 0.7

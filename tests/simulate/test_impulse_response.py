@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from bisar_budget.simulator.image_formation import taylor_window
 from bisar_budget.simulator.impulse_response import (
     impulse_response,
-    impulse_response_2d,
     line_at,
     row_of_peak,
     upsampled,
@@ -196,44 +195,6 @@ def chip(place=(0.0, 0.0), quadratic: float = 0.0, windows=(None, None), carrier
 
 
 class TestChip:
-    @given(place=st.tuples(st.floats(-6, 6), st.floats(-6, 6)))
-    @examples(8, default=6)
-    def test_uniform_apertures_wherever_the_peak_lies(self, place) -> None:
-        image, spacing = chip(place)
-        got = impulse_response_2d(image, (spacing, spacing))
-        assert got.peak == pytest.approx(1.0, abs=1e-3)
-        assert got.peak_m == pytest.approx((place[0] * spacing, place[1] * spacing), abs=1e-3)
-        for cut in (got.range_cut, got.cross_range_cut):
-            assert cut.irw_m == pytest.approx(0.8859, abs=1e-3)
-            assert cut.pslr_db == pytest.approx(-13.241, abs=0.005)  # max |sin πx / 38 sin(πx/38)|, x in 1…2
-            assert cut.islr_db == pytest.approx(-9.68, abs=0.03)
-        mainlobe = 0.90282**2  # energy of sinc² within its nulls, on both axes
-        # Weights of whole pixels, 0.05 cells, near a null: 0.01 dB.
-        assert got.islr_db == pytest.approx(10 * math.log10((1 - mainlobe) / mainlobe), abs=0.03)
-        assert got.pslr_db == pytest.approx(-13.26, abs=0.03)
-
-    def test_quadratic_phase_shows_in_cross_range_only(self) -> None:
-        clean_image, spacing = chip()
-        clean = impulse_response_2d(clean_image, (spacing, spacing))
-        mask = clean.range_cut.mask_m, clean.cross_range_cut.mask_m
-        got = impulse_response_2d(chip((0.3, -0.4), math.pi / 2)[0], (spacing, spacing), mask)
-        assert got.range_cut.pslr_db == pytest.approx(-13.26, abs=0.02)
-        assert got.cross_range_cut.pslr_db == pytest.approx(-9.04, abs=0.03)
-        assert got.cross_range_cut.islr_db == pytest.approx(-6.27, abs=0.03)
-        assert got.pslr_db == pytest.approx(-9.04, abs=0.03)
-        assert 20 * math.log10(got.peak / clean.peak) == pytest.approx(-0.97, abs=0.01)
-        # Energies of separable responses multiply: total/mainlobe is the product of the cuts'.
-        whole = (1 + 10 ** (-0.627)) * (1 + 10 ** (-0.968))
-        assert got.islr_db == pytest.approx(10 * math.log10(whole - 1), abs=0.03)
-
-    def test_a_carrier_and_unequal_spacing(self) -> None:
-        image, spacing = chip((1.3, -2.6), carrier=(30, -25), windows=(taylor_window(CHIP_BAND), None))
-        got = impulse_response_2d(image, (2 * spacing, spacing))
-        assert got.peak_m == pytest.approx((2.6 * spacing, -2.6 * spacing), abs=1e-3)
-        assert got.range_cut.pslr_db == pytest.approx(-35, abs=0.5)
-        assert got.range_cut.irw_m == pytest.approx(2 * 1.19, abs=0.03)  # Taylor -35 dB, n̄ 5: broadened 1.34 times
-        assert got.cross_range_cut.irw_m == pytest.approx(0.8859, abs=1e-3)
-
     @pytest.mark.parametrize("place", [(0.5, 0.2), (-0.45, -7.4), (3.3, 0.5), (-30.5, 41.4)])
     def test_a_line_goes_through_a_peak_between_lines_of_pixels(self, place) -> None:
         """Half a pixel beside the peak a line of pixels is sinc(0.2), 0.58 dB, too low: `simulate` measured that."""
@@ -247,28 +208,6 @@ class TestChip:
         assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
         part = line_at(image[:, start : start + 25], row)
         assert part == pytest.approx(line[start : start + 25], abs=5e-3)
-
-    def test_skewed_sidelobes_do_not_move_the_peak(self) -> None:
-        image, spacing = chip((0.45, -0.35), skew=0.5)
-        got = impulse_response_2d(image, (spacing, spacing))
-        assert got.peak_m == pytest.approx((0.45 * spacing, -0.35 * spacing), abs=1e-3)
-        assert got.peak == pytest.approx(1.0, abs=1e-3)
-
-    @pytest.mark.parametrize("place", [(-48, 0), (0, 46.8), (45.7, 0), (0, -47)])
-    def test_a_peak_at_the_edge(self, place) -> None:
-        image, spacing = chip(place)
-        with pytest.raises(ValueError, match="edge"):
-            impulse_response_2d(image, (spacing, spacing))
-
-    def test_no_numbers_no_measures(self) -> None:
-        image, spacing = chip()
-        with pytest.raises(ValueError, match="all zero"):
-            impulse_response_2d(0 * image, (spacing, spacing))
-        image[3, 4] = math.nan
-        with pytest.raises(ValueError, match="NaN"):
-            impulse_response_2d(image, (spacing, spacing))
-        with pytest.raises(ValueError, match=r"shape \(96,\)"):
-            impulse_response_2d(image[0], (spacing, spacing))
 
 
 @pytest.mark.extras
@@ -319,12 +258,3 @@ class TestAgainstPerseo:
         near, far = (impulse_response(cut, spacing, reach_m=n * 0.88589) for n in (5, 10))
         assert (pslr, islr) == pytest.approx((-13.26, -10.21), abs=0.02)
         assert (near.pslr_db, far.islr_db) == pytest.approx((pslr, islr), abs=0.02)
-
-
-def test_a_mainlobe_beyond_the_chip_is_an_error_not_a_crash() -> None:
-    """A smear of a jet's refocused chip had its mainlobe's edge at pixel 997 of 992."""
-    x = np.arange(-32, 32) / 3
-    sharp, wide = np.sinc(x), np.exp(-((x / 12) ** 2))
-    chip = np.outer(sharp, wide).astype(complex)
-    with pytest.raises(ValueError, match=r"beyond the chip|mainlobe|null"):
-        impulse_response_2d(chip, (1.0, 1.0), (3.0, 60.0))
