@@ -6,21 +6,18 @@ arrays (cases,). `Case` gives the plain numbers of a single case for the text of
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
-from bisar_budget.analysis.peak_loss import peak_loss_db
-from bisar_budget.analysis.spread import SpreadPhase, rests, tones
+from bisar_budget.analysis.allocation import allocate, autofocus_gain_of
+from bisar_budget.analysis.spread import SpreadPhase, noise, rests, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import tone_displacements
-from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
+from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.effects.combined import correlated_errors
 from bisar_budget.effects.declared import MODELS, Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
-from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.slow_tones import slow_phases, slow_tones
 from bisar_budget.effects.sources import exact_ranges
@@ -107,6 +104,13 @@ class Analysis:
     allocation : Allocation
         Budgets of the cases, divided between transmitter, receiver and clock. The split `balanced` divides in
         proportion to the phases in the gating model. Under `strictest` it uses the larger phase of both models.
+    noise : dict of str to list of SpreadPhase
+        Phase errors by noise, see `spread.noise`. The keys are the names of the models.
+    rests : dict of str to list of SpreadPhase
+        Parts of the phases of declared errors beyond the cubic order, see `spread.rests`. The keys are the names of
+        the models. The published model has no such parts.
+    resolution : Resolution
+        Widths of the error-free impulse response, as arrays (cases,).
     """
 
     def __init__(
@@ -143,20 +147,16 @@ class Analysis:
             self.gates = [model for model in MODELS if mission.gating_model in (model, "strictest")]
             self.allocation = allocate(mission, (self._together[model] for model in self.gates))
             self.published, self.full = Model(self.errors, "published"), Model(self.errors, "full")
-        self._rests: dict[str, list[SpreadPhase]] = {}
+            self.noise = {model: noise(mission, self.geometry, self.random, model) for model in MODELS}
+            self.rests: dict[str, list[SpreadPhase]] = {
+                "published": [],
+                "full": rests(self.errors, self.random, self.slow, self.slow_tones),
+            }
+            self.resolution = resolution(self.exact, self.geometry, mission.radar, mission.collection.aperture_time)
 
     def together(self, model: str) -> Together:
         """Return the declared errors and their combination in the model of the given name."""
         return self._together[model]
-
-    def rests(self, model: str) -> list[SpreadPhase]:
-        """List the parts beyond the cubic order of the phases of declared errors, in the model of the given name.
-
-        They are computed by `spread.rests`.
-        """
-        if model not in self._rests:
-            self._rests[model] = rests(self, model)
-        return self._rests[model]
 
     def models(self, gating: str) -> tuple[Model, Model]:
         """Return both models, with the gating model first.
@@ -165,26 +165,13 @@ class Analysis:
         """
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
-    # ---------------------------------------------------------------- what only some questions need
-    @cached_property
-    def resolution(self) -> Resolution:
-        """Widths of the error-free impulse response, as arrays (cases,)."""
-        return resolution(self.exact, self.geometry, self.mission.radar, self.mission.collection.aperture_time)
-
-    @cached_property
-    def peak_loss_db(self) -> Floats:
-        """Loss of the image peak due to all declared errors, (cases,). [dB]
-
-        It is NaN where an error leaves no image, or where no error is declared.
-        """
-        return peak_loss_db(self)
-
-    @cached_property
+    # ---------------------------------------------------------------- a single case
+    @property
     def sources(self) -> list[ErrorSource]:
         """List the errors of an analysis with a single case in plain numbers, in the order of the report's rows."""
         return [error.in_one_case() for error in self.errors.listed]
 
-    @cached_property
+    @property
     def stated(self) -> list[ErrorSource]:
         """List the declared errors of a single case along the axes in which the mission file states them."""
         return [source for source in self.sources if source.declared is not None and source.is_independent]
@@ -202,45 +189,31 @@ class Case:
         only this case.
     place : int
         Index of this case in the arrays of the analysis.
+
+    Attributes
+    ----------
+    geometry : BistaticGeometry
+        Geometry of this case.
+    resolution : Resolution
+        Widths of the error-free impulse response in this case.
+    allocation : Allocation
+        Budgets of this case, divided between transmitter, receiver and clock.
+    random : list of RandomError
+        Random errors of sensors, clocks and the air in this case, in the same order as in `Analysis.random`.
     """
 
     def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
         self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
+        self.resolution = Resolution._make(map(self.number, analysis.resolution))
+        if analysis.is_by_itself:
+            self.geometry, self.allocation, self.random = analysis.geometry, analysis.allocation, analysis.random
+        else:
+            self.geometry, self.allocation = self.mission.geometry, analysis.allocation.of(place)
+            self.random = [in_one_case(self.mission, error, place) for error in analysis.random]
 
     def number(self, column: PerCase | PerCaseFlag) -> float:
         """Return the number of this case from an array (cases,), or from a single number that holds for all cases."""
         return plain(column, self.place)
-
-    @cached_property
-    def geometry(self) -> BistaticGeometry:
-        """Geometry of this case."""
-        return self.analysis.geometry if self.analysis.is_by_itself else self.mission.geometry
-
-    @cached_property
-    def resolution(self) -> Resolution:
-        """Widths of the error-free impulse response in this case."""
-        return Resolution._make(map(self.number, self.analysis.resolution))
-
-    @cached_property
-    def peak_loss_db(self) -> float | None:
-        """Loss of the image peak in this case due to all declared errors. [dB]
-
-        It is None if an error leaves no image, or if no error is declared."""
-        loss = self.number(self.analysis.peak_loss_db)
-        return loss if math.isfinite(loss) else None
-
-    @cached_property
-    def allocation(self) -> Allocation:
-        """Budgets of this case, divided between transmitter, receiver and clock."""
-        allocation = self.analysis.allocation
-        return allocation if self.analysis.is_by_itself else allocation.of(self.place)
-
-    @cached_property
-    def random(self) -> list[RandomError]:
-        """Random errors of sensors, clocks and the air in this case, in the same order as in `Analysis.random`."""
-        if self.analysis.is_by_itself:
-            return self.analysis.random
-        return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
         """Return the phases and the displacement that a declared error causes in this case, according to a model."""

@@ -9,12 +9,12 @@ against images formed by direct sums.
 """
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bisar_budget.analysis.spread import CUBIC_POWER, noise
+from bisar_budget.analysis.spread import CUBIC_POWER, SpreadPhase, Tone
+from bisar_budget.analysis.together import Together
 from bisar_budget.arrays import Floats
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import DeclaredErrors
@@ -22,22 +22,31 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.image_plane import FINEST_NODES, SIGHT_POLYNOMIAL_COUNT, nodes
 from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
-if TYPE_CHECKING:
-    from bisar_budget.analysis.analysis import Analysis
-
 _DB_OF_VARIANCE = 10 / math.log(10)
 
 
 @np.errstate(invalid="ignore")
-def peak_loss_db(analysis: "Analysis") -> Floats:
+def peak_loss_db(
+    errors: DeclaredErrors, together: Together, spreads: Iterable[SpreadPhase], tones: Iterable[Tone]
+) -> Floats:
     """Loss of the image peak due to all declared errors, (cases,). [dB]
 
     The losses of single errors are combined by the mission's rule. Under root-sum-square the decibels are added.
     Under `sum` the square roots of the decibels are added, and the result is squared. Under `each` the largest loss
     is taken. The loss is NaN where an error leaves no image, or where no error is declared.
+
+    Parameters
+    ----------
+    errors : DeclaredErrors
+        Errors of motion and clocks.
+    together : Together
+        Combination of all declared errors in the full model.
+    spreads : iterable of SpreadPhase
+        Phase errors that spread energy, in the full model: noise, and parts of phases beyond the cubic order.
+    tones : iterable of Tone
+        Tones that make paired echoes.
     """
-    errors, together = analysis.errors, analysis.together("full")
-    losses = list(_losses_of_motion(analysis, together.motion))
+    losses = _losses_of_motion(errors, together)
     of_motion = {error.subject.id for error in together.motion}
     variances: dict[str, Floats] = {}
     for phase in together.phases:
@@ -45,31 +54,31 @@ def peak_loss_db(analysis: "Analysis") -> Floats:
             cubic = 0.0 if phase.cubic_rad is None else np.where(errors.exact.is_turned, 0.0, phase.cubic_rad)
             variance = (phase.judged(1.0) / QUADRATIC_OF_VARIANCE) ** 2 + CUBIC_POWER * cubic**2
             variances[phase.row_id] = errors.array(variance)
-    for spread in (*noise(analysis, "full"), *analysis.rests("full")):
+    for spread in spreads:
         if spread.row_id not in of_motion:
             variances[spread.row_id] = variances.get(spread.row_id, 0.0) + np.nan_to_num(
                 errors.array(spread.variance)
             )
     losses += [_DB_OF_VARIANCE * variance for variance in variances.values()]
-    losses += [errors.array(_DB_OF_VARIANCE * np.where(t.is_there, t.phase**2 / 2, 0.0)) for t in analysis.tones]
+    losses += [errors.array(_DB_OF_VARIANCE * np.where(t.is_there, t.phase**2 / 2, 0.0)) for t in tones]
     if not losses:
         return errors.array(math.nan)
     return np.square(errors.array(combined([np.sqrt(loss) for loss in losses], together.rule)))
 
 
-def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> list[Floats]:
+def _losses_of_motion(errors: DeclaredErrors, together: Together) -> list[Floats]:
     """List the peak loss due to each error of motion or of a clock, for the worse sign of the error, (cases,). [dB]
 
     Under root-sum-square the six correlated errors of a covariance are replaced by six independent errors that
     together have the same covariance.
     """
-    errors, together = analysis.errors, analysis.together("full")
+    motion = together.motion
     if not motion:
         return []
     remaining = _range_errors_left(errors, motion)
     index_by_id = {error.subject.id: index for index, error in enumerate(motion)}
     losses = dict(zip(index_by_id, peak_losses(errors.exact, remaining).max(axis=1), strict=True))
-    for group in analysis.groups if together.rule == "rss" else ():
+    for group in together.groups if together.rule == "rss" else ():
         if index_by_id.keys() >= set(group.ids):
             independent = together.independent(group, remaining[[index_by_id[row_id] for row_id in group.ids], 0])
             losses |= dict(zip(group.ids, peak_losses(errors.exact, independent), strict=True))

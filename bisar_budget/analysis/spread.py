@@ -12,7 +12,7 @@ instead.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,11 +20,13 @@ import numpy as np
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import MAINLOBE_ENERGY
-from bisar_budget.effects.declared import CUBIC
+from bisar_budget.effects.declared import CUBIC, DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
-from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted, lines_of
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.slow_tones import SlowTone
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, DeclaredPhase, counted, lines_of
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
@@ -186,20 +188,22 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
     return [each[0]._replace(in_quadrature=alone.in_quadrature), *each[1:]]
 
 
-def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
+def noise(
+    mission: Mission, geometry: BistaticGeometry, random: Iterable[RandomError], model: str
+) -> list[SpreadPhase]:
     """List the phase errors by noise, which spread energy over the image, with their variances. [rad²]
 
-    Their origins are wideband vibration, sensor noise, phase noise, synchronization links, and ISLR contributions
-    that the mission file states.
+    Their origins are wideband vibration, the random errors `random`, and ISLR contributions that the mission file
+    states. Random errors are sensor noise, phase noise and synchronization links.
     """
-    mission, spreads = analysis.mission, []
+    spreads = []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
-            rms = counted(mission, name, wideband.rms, "islr", analysis.geometry)
+            rms = counted(mission, name, wideband.rms, "islr", geometry)
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             spreads.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
-    for error in analysis.random:
+    for error in random:
         if error.declared is not None and error.spreads and not error.counted_in:
             spreads.append(SpreadPhase(error.id, error.owner, (error.effect(model).spread * error.declared) ** 2))
     energy = mainlobe_energy(mission)
@@ -208,34 +212,47 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     return spreads
 
 
-def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
+def rests(
+    errors: DeclaredErrors,
+    random: Iterable[RandomError],
+    slow: Iterable[DeclaredPhase],
+    slow_tones: Mapping[str, SlowTone],
+) -> list[SpreadPhase]:
     """List the parts beyond the cubic order of the phases that errors cause, with their variances. [rad²]
 
     The errors are errors of motion, clocks and sensors, and slow vibrations. The variances are at one sigma, without
     coverage factor. Negligible phases are left out. The phases are very small for short apertures, and larger for an
-    aperture of a quarter of a circle. The list is empty in the published model. Where a line of sight turns by more
-    than a radian, these parts are left out, because the quadratic phase of equal peak loss already contains them.
+    aperture of a quarter of a circle. They follow from the full model. Where a line of sight turns by more than a
+    radian, these parts are left out, because the quadratic phase of equal peak loss already contains them.
+
+    Parameters
+    ----------
+    errors : DeclaredErrors
+        Errors of motion and clocks.
+    random : iterable of RandomError
+        Errors of sensors, clocks and the air.
+    slow : iterable of DeclaredPhase
+        Phases of vibrations below one cycle per aperture.
+    slow_tones : mapping of str to SlowTone
+        Vibrations below three cycles per aperture. The keys are the ids of their rows.
     """
-    if model == "published":
-        return []
-    spreads, errors = [], analysis.errors
-    factor = analysis.mission.allocation.coverage_factor
+    spreads, factor = [], errors.mission.allocation.coverage_factor
     for error in errors.stated:
         if error.is_motion:
-            rms = np.asarray(errors.does(model, error).rest) / (factor if error.is_covered else 1.0)
+            rms = np.asarray(errors.does("full", error).rest) / (factor if error.is_covered else 1.0)
             shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
             if shows.any():
                 spreads.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
-    for sensor in analysis.random:
+    for sensor in random:
         if sensor.declared is not None and not sensor.counted_in:
             rms = np.asarray(sensor.full.rest * sensor.declared)
             shows = rms > SMALLEST_REST_RAD
             if shows.any():
                 spreads.append(SpreadPhase(sensor.id, sensor.owner, np.where(shows, rms**2, math.nan)))
-    slow = {phase.row_id: phase.is_there for phase in analysis.slow}
-    for tone in analysis.slow_tones.values():
+    is_slow = {phase.row_id: phase.is_there for phase in slow}
+    for tone in slow_tones.values():
         rms = tone.declared.rest
-        shows = slow.get(tone.subject.id, False) & (rms > SMALLEST_REST_RAD) & ~errors.exact.is_turned
+        shows = is_slow.get(tone.subject.id, False) & (rms > SMALLEST_REST_RAD) & ~errors.exact.is_turned
         if shows.any():
             spreads.append(SpreadPhase(tone.subject.id, tone.subject.owner, np.where(shows, rms**2, math.nan)))
     return spreads
@@ -260,7 +277,7 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
     error is left out or does not occur.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
-    spreads = noise(analysis, model) + analysis.rests(model)
+    spreads = analysis.noise[model] + analysis.rests[model]
     if mission.requirements.pslr is None:
         for spread in analysis.tones:
             variance = np.where(spread.is_there, spread.phase**2 / 2, math.nan)[()]

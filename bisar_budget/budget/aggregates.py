@@ -15,7 +15,6 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
-from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
@@ -324,7 +323,7 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
         "cubic": cubics(together.phases),
         "spread": [
             (phase.row_id, np.sqrt(np.nan_to_num(array(phase.variance))))
-            for phase in (*noise(analysis, model), *analysis.rests(model))
+            for phase in (*analysis.noise[model], *analysis.rests[model])
         ],
         "tone": [(tone.subject.id, array(tone.is_there * tone.phase)) for tone in analysis.tones],
     }

@@ -18,6 +18,8 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, by_nodes
+from bisar_budget.analysis.peak_loss import peak_loss_db
+from bisar_budget.arrays import Floats
 from bisar_budget.budget.confidence import confidence_of
 from bisar_budget.budget.declarations import declared_kinds
 from bisar_budget.budget.doubts import collection_notes, model_doubt, orbit_notes
@@ -61,7 +63,8 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
         Rows of declared and undeclared errors, in the order of the contract.
     """
     analysis = Analysis(mission, is_complete=True)
-    return _findings(judged_mission(analysis, today), Case(analysis), today, outside, analysis)
+    judged = judged_mission(analysis, today)
+    return _findings(judged, Case(analysis), _peak_loss_db(analysis), today, outside, analysis)
 
 
 def check_missions(
@@ -89,17 +92,32 @@ def check_missions(
                 analysis = Analysis(
                     mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_complete=True
                 )
-                judged = judged_mission(analysis, today)
+                judged, losses_db = judged_mission(analysis, today), _peak_loss_db(analysis)
                 for case_index, index in enumerate(block[same_nodes].tolist()):
                     alone = Analysis(missions[index], is_complete=True) if keeps_analysis else None
                     case = Case(analysis, missions[index], case_index)
-                    yield index, _findings(judged, case, today, outside, alone)
+                    yield index, _findings(judged, case, losses_db, today, outside, alone)
+
+
+def _peak_loss_db(analysis: Analysis) -> Floats:
+    spreads = (*analysis.noise["full"], *analysis.rests["full"])
+    return peak_loss_db(analysis.errors, analysis.together("full"), spreads, analysis.tones)
 
 
 def _findings(
-    judged: JudgedMission, case: Case, today: date, outside: Outside, analysis: Analysis | None
+    judged: JudgedMission,
+    case: Case,
+    losses_db: Floats,
+    today: date,
+    outside: Outside,
+    analysis: Analysis | None,
 ) -> MissionFindings:
-    """Collect the findings of one judged case, with their texts."""
+    """Collect the findings of one judged case, with their texts.
+
+    `losses_db` are the losses of the image peak in all judged cases, see `peak_loss_db`. [dB]
+    """
+    loss_db = case.number(losses_db)
+    peak_loss = loss_db if math.isfinite(loss_db) else None  # no image, or no declared error
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
@@ -115,7 +133,7 @@ def _findings(
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=case.resolution,
-        peak_loss_db=case.peak_loss_db,
+        peak_loss_db=peak_loss,
         allocation=case.allocation,
         rows=tuple(rows),
         requirements=requirements,
@@ -127,7 +145,7 @@ def _findings(
         scene=None if judged.scene is None else judged.scene.edge(case),
         notes=(
             *negligible_effects(judged, case),
-            *collection_notes(case),
+            *collection_notes(case, peak_loss),
             *orbit_notes(case, rows),
             *_unused_keys(mission),
             *_overridden(mission),

@@ -507,8 +507,11 @@ def missing_settings(mission: Mission) -> list[str]:
     return [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
 
 
-def collection_notes(case: Case) -> Iterator[Note]:
-    """Yield notes on assumptions of the models that a collection may violate, and on images with several peaks."""
+def collection_notes(case: Case, peak_loss_db: float | None) -> Iterator[Note]:
+    """Yield notes on assumptions of the models that a collection may violate, and on images with several peaks.
+
+    `peak_loss_db` is the loss of the image peak due to all declared errors. [dB] It is None if it is unknown.
+    """
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
@@ -516,8 +519,8 @@ def collection_notes(case: Case) -> Iterator[Note]:
         turn = float(norm(state.look_rate)) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
             yield phrases.note("sight-turns", platform=name, half_turn=turn)
-    if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:
-        yield phrases.note("image-may-have-several-peaks", loss_db=case.peak_loss_db)
+    if peak_loss_db is not None and peak_loss_db > ONE_PEAK_DB:
+        yield phrases.note("image-may-have-several-peaks", loss_db=peak_loss_db)
     if mission.has_direct_path:
         yield phrases.note("direct-path-is-the-clock")
     if mission.requirements.location_error is None and (missing := missing_settings(mission)):

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import scene_edges
-from bisar_budget.analysis.spread import noise
 from bisar_budget.arrays import Booleans, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
@@ -283,8 +282,8 @@ def _has_noise(judging: Judging, analysis: Analysis) -> Booleans:
     """
     array, gates, cases = judging.array, analysis.gates, analysis.cases
     level = negligible_rad(analysis.mission)
-    has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in noise(analysis, model)]
-    has_any += [np.sqrt(array(phase.variance)) >= level for model in gates for phase in analysis.rests(model)]
+    has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in analysis.noise[model]]
+    has_any += [np.sqrt(array(phase.variance)) >= level for model in gates for phase in analysis.rests[model]]
     if analysis.mission.requirements.pslr is None:
         has_any += [np.broadcast_to(phase.is_there, (cases,)) for phase in analysis.tones]
     return np.asarray(np.any([np.zeros(cases, bool), *has_any], axis=0))
