@@ -4,6 +4,7 @@
 __all__ = [
     "allocation",
     "analysis",
+    "peak_loss",
     "scene",
     "spread",
     "together",
