@@ -263,7 +263,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
 
 
 def _parse_closely(value: object, dimension: Dimension) -> float:
-    """Read a quantity in any accepted form; the error for any other text explains what is wrong with it."""
+    """Read a quantity in any accepted form, or raise an error that explains why the value cannot be read."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -311,16 +311,16 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
 
 def unit_behind(text: str) -> str:
-    """Unit after the number in a text, as written; the whole text if it has no number."""
+    """Unit after the number in a string, as written; the whole string if it contains no number."""
     text = text.strip()
     match = _NUMBER.match(text)
     return text[match.end() :].strip() if match else text
 
 
 def given_unit(text: str, unit: str) -> str:
-    """Unit behind the number in a text, spelt as in the tables of units.
+    """Unit after the number in a string, spelt as in the tables of units.
 
-    `unit` is an SI unit. The result is empty if the text has no unit, or is not a quantity of the same dimension as
+    `unit` is an SI unit. The result is empty if the string has no unit, or is not a quantity of the same dimension as
     `unit`.
     """
     match = _NUMBER.match(text.strip()) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
@@ -386,9 +386,10 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """Forms in which a quantity of a unit is written, one for each prefix; the form without a prefix is last.
+    """List the printed forms of a unit, with each usual prefix and finally without a prefix.
 
-    A form is its factor to SI, the sizes in SI from which and below which it applies, and the text after the number.
+    A form has four entries: the factor that converts to SI, the smallest SI value for which the form is used, the SI
+    value from which the form is no longer used, and the string after the number.
     """
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]

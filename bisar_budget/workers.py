@@ -23,9 +23,10 @@ Result = TypeVar("Result")
 
 
 class MapBlocks(Protocol):
-    """Type of functions that have worker processes apply a function to common data and to each of many blocks.
+    """Type of functions that distribute many blocks of work over worker processes.
 
-    Such a function yields each block with its result, in any order. `about` describes a block in messages.
+    Such a function calls `function` with the common data and each block, and yields each block with its result, in
+    any order. `about` returns the description of a block for messages.
     """
 
     def __call__(
@@ -43,7 +44,7 @@ _POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon 
 
 
 def unseen(done: int, total: int) -> None:
-    """Ignore reports of progress; used where nobody watches the computation."""
+    """Ignore a report of progress; used if progress is not shown."""
 
 
 @contextmanager

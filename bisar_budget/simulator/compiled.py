@@ -571,16 +571,17 @@ def _leg(position, box, centres):
 def _bend(distance, size):
     """Upper bound of the error of a linearised distance. [m]
 
-    `distance` is the distance to a point, and is linearised for displacements of the point up to `size`. [m]
+    The distance to a point is expanded to first order in the displacement of the point. `distance` is its value
+    without displacement, and `size` the largest displacement. [m]
     """
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
 
 @_parallel
 def _reach(transmitter, receiver, centres, halves):
-    """Lower and upper bound of the range sum of all pixels in the boxes, at each pulse, (pulses,) each. [m]
+    """Smallest and largest range sum that pixels in the boxes can have at each pulse, as two arrays (pulses,). [m]
 
-    `centres` and `halves` are the results of `_boxes`. The range sum is convex, so it is nowhere below its tangent
+    `centres` and `halves` are the results of `_boxes`. The range sum is convex, so it is never below its tangent
     plane at the centre of a box. The range of each platform exceeds its tangent plane by at most `_bend`.
     """
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
@@ -603,9 +604,10 @@ def _reach(transmitter, receiver, centres, halves):
 
 @_compiled
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
-    """Compute the profile sample before each pixel, the pixel's distance from it, and fractions of carrier cycles.
+    """Convert range sums of pixels to positions in a range profile, and to fractions of a carrier cycle.
 
-    They are computed from the range sums `sums` [m], and written to `index`, `between` and `turn`.
+    `sums` are the range sums. [m] `index` receives the index of the last profile sample before each pixel, `between`
+    the distance from this sample to the pixel in samples, and `turn` the fraction of a carrier cycle.
     """
     for i in range(index.shape[0]):
         for j in range(_SEGMENT_LENGTH):
@@ -618,7 +620,7 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add the contributions of a block of pulses to scattered pixels (3, n), with exact ranges of all pixels."""
+    """Add the contributions of a block of pulses to scattered pixels (3, n), with the exact range of every pixel."""
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)

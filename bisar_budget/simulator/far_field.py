@@ -109,7 +109,7 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
 
 
 class PolarFormat(NamedTuple):
-    """Image (nx, ny) by the polar format, and the frequency grid (13) from which it was formed.
+    """Image (nx, ny) formed by the polar format, and the frequency grid (13) from which it was formed.
 
     `frequency_x` (Nx,) are the frequencies f′x of the grid, and `frequency_y` (Ny,) the frequencies f′y. [Hz]
     """
@@ -128,9 +128,9 @@ def polar_format(
 ) -> PolarFormat:
     """Form an image by (14): interpolate samples to the rectangular grid (13) of the rotated frame, then use an FFT.
 
-    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. It omits a
-    larger part if the relative bandwidth or the squint is larger. The frequency step of the grid is c/(2·size), so
-    the image repeats after its own size.
+    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. The omitted part
+    increases with the relative bandwidth and with the squint. The frequency step of the grid is c/(2·size), so the
+    image is periodic, and its period is its own size.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def polar_format(
 
 
 def _grid(low: float, high: float, step: float) -> Floats:
-    """Frequencies between two bounds that are multiples of a step; the array is empty if there are none. [Hz]
+    """Multiples of the frequency step `step` between the bounds `low` and `high`; may be empty. [Hz]
 
     An FFT of samples at these frequencies has no carrier.
     """

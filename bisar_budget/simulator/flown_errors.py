@@ -17,7 +17,7 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
     Parameters
     ----------
     source : ErrorSource
-        Error of a platform, a clock or the terrain, which moves the image point (`source.displaces`).
+        Error of a platform, a clock or the terrain. It must displace the image point (`source.displaces` is true).
     size : float
         Signed size in the unit of the error, coverage factor included.
     geometry : BistaticGeometry

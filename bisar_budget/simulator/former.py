@@ -1,9 +1,9 @@
-"""Image formers with a common interface: their pixels, the ground point at which they show a target, and the image.
+"""Image formers with a common interface: the pixels, the ground point at which a target appears, and the image.
 
-The image is at baseband. A former by exact ranges, (4), shows a target at its displaced point, and uses pixels along
-lines of equal range. A former by plane waves, (7) to (14), shows a target where plane waves have the recorded range
-history. It uses straight lines of pixels along the axes (x′, y′) of (10). Ground points are given as east and
-north. [m]
+Images are at baseband. With exact ranges, (4), a target appears at its displaced point, and the pixels are along
+lines of equal range. With plane waves, (7) to (14), a target appears at the point whose plane-wave range history
+matches the recorded range history, and the pixels are along the axes (x′, y′) of (10). Ground points are given as
+east and north. [m]
 """
 
 import math
@@ -86,7 +86,7 @@ class ExactRangeFormer:
         return self.lines.grid(centre, spacing, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the baseband image at pixels (nx, ny, 3), (nx, ny).
+        """Form the baseband image (nx, ny) at the pixel positions `grid`, (nx, ny, 3). [m]
 
         `on_pixels` is called with the number of pixels of each block that is formed.
         """
@@ -110,7 +110,7 @@ class PlaneWaves:
     """Image former by plane waves: far-field filter (12), or polar format (13) and (14).
 
     `sight` (times, 2) are the ground components of the sum of the unit vectors from the scene centre to both
-    platforms, for the measured paths. Its odd number of slow times has the aperture midpoint in the middle.
+    platforms, for the measured paths. The number of slow times is odd, and the middle slow time is mid-aperture.
     `is_polar` selects the polar format.
     """
 
@@ -134,8 +134,8 @@ class PlaneWaves:
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
         """Ground point at which the image shows a target, east and north. [m]
 
-        It has the smallest variance of the phase that remains when the range history `recorded` [m] is compared with
-        the plane-wave model (5).
+        At this point the plane-wave model (5) fits the range history `recorded` [m] best: the variance of the
+        residual phase is smallest.
         """
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
@@ -179,9 +179,9 @@ class PlaneWaves:
         return ground_grid(centre, self.azimuth, size, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
-        """Form the baseband image at pixels (nx, ny, 3), (nx, ny).
+        """Form the baseband image (nx, ny) at the pixel positions `grid`, (nx, ny, 3). [m]
 
-        The polar format requires pixels that `grid` has returned. `on_pixels` is called with the number of pixels of
+        The polar format requires positions returned by the method `grid`. `on_pixels` is called with the number of pixels of
         each block that is formed.
         """
         if not self.is_polar:
@@ -199,8 +199,8 @@ class PlaneWaves:
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
         """Estimate the time to form an image from `pulses` pulses. [s]
 
-        For a Fourier transform it is proportional to the numbers of samples and pixels, because the transform uses
-        each of them only a few times. The far-field filter without finufft is timed in a trial with few pulses.
+        If the image is formed by Fourier transforms, the time is estimated from the numbers of samples and pixels.
+        The far-field filter without finufft is timed in a trial with few pulses.
         """
         if not self.is_polar and not is_nonuniform():
             return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)

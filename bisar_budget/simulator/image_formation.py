@@ -57,7 +57,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
-    """Form an image at points (n, 3) by the sum of (4) over pulses and frequencies, (n,).
+    """Form an image (n,) at points (n, 3) by the sum of (4) over pulses and frequencies.
 
     `ranges(points, pulse)` gives the differential ranges ΔR at a pulse, (n,). [m]
     """
@@ -175,7 +175,7 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Evaluate a periodic cubic B-spline at fractional sample positions `cell` (n,), (n,).
+    """Evaluate a periodic cubic B-spline at fractional sample positions `cell`; both arrays are (n,).
 
     `spline` (samples + 3,) are the coefficients at the samples. They are extended periodically by one coefficient at
     the start and two at the end.

@@ -38,8 +38,8 @@ class ImpulseResponse:
 
     `irw_m` is the width at half power. [m] `peak` is the magnitude of the peak. `peak_m` is its position along the
     cut, relative to the middle sample. [m] `mask_m` is the half width of the mainlobe mask. [m] `pslr_db` and
-    `islr_db` are the peak and the integrated sidelobe ratio outside the mask. [dB] The integrated ratio is that of
-    the energy of the sidelobes to the energy of the mainlobe.
+    `islr_db` are the peak and the integrated sidelobe ratio outside the mask. [dB] The integrated ratio is the energy
+    of the sidelobes divided by the energy of the mainlobe.
     """
 
     irw_m: float
@@ -238,9 +238,9 @@ def _vertex(values: Floats, top: int) -> float:
 
 # ---------------------------------------------------------------------- an image read anywhere
 def between(values: Floats, row: Floats, column: Floats) -> Floats:
-    """Interpolate a table (nx, ny, k) linearly at fractional rows and columns (n,), (n, k).
+    """Interpolate a table (nx, ny, k) linearly at n fractional rows and columns; the result is (n, k).
 
-    Beyond the table the values are extrapolated.
+    Beyond the edges of the table, the values are extrapolated.
     """
     nx, ny = values.shape[:2]
     i = np.clip(np.floor(row).astype(np.int64), 0, nx - 2)
@@ -254,7 +254,7 @@ def between(values: Floats, row: Floats, column: Floats) -> Floats:
 
 
 def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Fractional rows and columns of ground points (n, 2) in a grid of pixels (nx, ny, 2), (n,) each.
+    """Fractional rows (n,) and columns (n,) of ground points (n, 2) in a grid of pixels (nx, ny, 2).
 
     Both are NaN for points more than half a pixel outside the grid.
     """
@@ -305,7 +305,7 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
 
 
 def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
-    """Interpolate an image at scattered fractional rows and columns (n,) by Lagrange polynomials, (n,).
+    """Interpolate an image by Lagrange polynomials at n scattered points, given by fractional row and column.
 
     The image is treated as periodic.
     """
@@ -320,9 +320,9 @@ def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
 
 
 def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
-    """First sample of the Lagrange stencil at each of `positions` (n,), and the weights of its samples.
+    """Index of the first sample of the Lagrange stencil for each of `positions` (n,), and the Lagrange weights.
 
-    The first samples are (n,). The list contains an array of weights (n,) for each sample of a stencil.
+    The indices are (n,). The list has an array of weights (n,) for each sample of the stencil.
     """
     first = np.floor(positions).astype(np.int64) - _TAPS_COUNT // 2 + 1
     return first, [lagrange_weight(positions - first, tap, _TAPS_COUNT) for tap in range(_TAPS_COUNT)]
@@ -331,7 +331,7 @@ def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int6
 def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
     """Lagrange weight of the sample with index `tap` in a stencil of `taps` samples, with the shape of `offset`.
 
-    `offset` are the positions of interpolation, counted from the first sample of the stencil. [samples]
+    `offset` contains the positions at which to interpolate, relative to the first sample of the stencil. [samples]
     """
     weight: Floats = np.ones(offset.shape)
     for node in range(taps):

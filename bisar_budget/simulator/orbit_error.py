@@ -1,7 +1,7 @@
 """Path error of a platform in free fall: the orbit from the measured state minus the orbit from the true state.
 
-Both orbits are integrated with the full law of gravity of a flattened Earth. The budget uses the linearised dynamics
-of `paths.free_fall` instead. The simulator does not use them, because it checks the budget.
+Both orbits are integrated with the full gravity of a flattened Earth. The budget uses the linearised dynamics of
+`paths.free_fall` instead. The simulator does not use them, so that it checks the budget independently.
 """
 
 from collections.abc import Sequence

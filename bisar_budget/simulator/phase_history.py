@@ -60,7 +60,7 @@ class Course:
     values: Floats
 
     def at(self, slow_time: Floats) -> Floats:
-        """Interpolate the values linearly at given slow times (m,), (m,) or (m, 3)."""
+        """Values at m slow times, by linear interpolation; (m,), or (m, 3) for vectors."""
         if self.values.ndim == 1:
             values: Floats = np.interp(slow_time, self.times, self.values)
             return values
@@ -89,10 +89,10 @@ class PathError(NamedTuple):
 
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are in
     east-north-up. Noise, and vibrations without an axis, are along the line of sight, positive away from the scene.
-    The errors of position, velocity and acceleration are those at mid-aperture. For a platform in free fall they give
-    the measured orbit minus the true orbit. For any other platform they are the coefficients of a polynomial of time.
-    `height` [m] is the height by which the scene is assumed too high. It moves the measured path up, and does not
-    change an orbit.
+    The errors of position, velocity and acceleration apply at mid-aperture. For a platform in free fall, they are the
+    initial errors of the measured orbit. For any other platform, they are the coefficients of a polynomial of time.
+    `height` [m] is the error of the assumed scene height, positive if the scene is assumed too high. It moves the
+    measured path up, and does not change an orbit.
     `time_tag` [s] is the delay of the time tags: the measured position at a time τ is the true position at τ plus the
     delay. `wideband_rms` [m] is the RMS position noise of the pulses, white or within `wideband_band` (low, high)
     [Hz]. It requires a random generator.
@@ -202,11 +202,11 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Paths of both platforms at given slow times, and the clock errors and delays at these times, (times,) each.
+    """Paths of both platforms at given slow times, with clock errors and delays at these times, (times,) each.
 
-    `clock` is the clock error. [s] `electrons` is the delay by free electrons at a frequency of 1 Hz, or None without
-    such a delay. [s·Hz²] `seen` is the clock error that alone would have the same effect on an image as `clock` and
-    the electrons together. [s]
+    `clock` is the clock error. [s] `electrons` is the delay by free electrons at a frequency of 1 Hz, or None if
+    there is no such delay. [s·Hz²] `seen` is the equivalent clock error, which has the same effect on an image
+    as `clock` and the electrons together. [s]
     """
 
     transmitter: Path
@@ -294,9 +294,9 @@ def cell_centres(length: float, count: int) -> Floats:
 
 
 def is_even(frequency: Floats) -> bool:
-    """Whether more than two frequencies are given and are evenly spaced.
+    """Whether there are more than two frequencies and they are evenly spaced.
 
-    Rounding errors are accepted if they are negligible within kilometres of range.
+    Rounding errors of the frequencies are tolerated if their effect is negligible over kilometres of range.
     """
     return frequency.size > 2 and float(np.ptp(np.diff(frequency))) <= _FREQUENCY_ROUNDING_FRACTION * float(
         np.abs(frequency).max()
@@ -306,8 +306,8 @@ def is_even(frequency: Floats) -> bool:
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
     """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums are the given wavenumbers.
 
-    The table of sums, with a line for each coarse wavenumber, contains the given wavenumbers in order. Its last line
-    may extend beyond them. The phasor of a sum is a product of two phasors, so n wavenumbers need only about 2√n
+    A table of these sums, with a row for each coarse wavenumber, contains the given wavenumbers in order. The last row
+    may extend beyond the given wavenumbers. The phasor of a sum is a product of two phasors, so n wavenumbers need only about 2√n
     exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
@@ -406,9 +406,9 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 
 
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
-    """Shortest displacement of each platform that changes the bistatic range minus the baseline by one metre. [m/m]
+    """Shortest displacement of each platform that changes the excess range by one metre. [m/m]
 
-    The baseline is the length of the direct path. Both results are (pulses, 3), the transmitter first. The
+    The excess range is the bistatic range minus the baseline, which is the length of the direct path. Both results are (pulses, 3), the transmitter first. The
     displacement of the transmitter is along u_t − b, and that of the receiver along u_r + b. Here u_t and u_r are the
     unit vectors from the scene centre to the platforms, and b is the unit vector from receiver to transmitter. The
     displacement is zero for a platform whose motion cannot change the bistatic range minus the baseline.
@@ -429,8 +429,9 @@ def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Flo
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
     """Clock error of a receiver that uses the direct signal of the transmitter as its clock, (pulses,). [s]
 
-    It is the measured minus the actual distance between the platforms, divided by c. The delay of an echo after the
-    direct signal is shorter by the actual distance, and the processor corrects it for the measured distance.
+    It is the measured minus the actual distance between the platforms, divided by c. The receiver measures the delay
+    of an echo after the direct signal, which itself arrives late by the actual distance divided by c. The processor
+    corrects for the measured distance.
     """
     transmitter, receiver = paths
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
@@ -539,8 +540,8 @@ def exact_effect(
 ) -> ExactEffect:
     """Compute from exact ranges the displacement and the remaining phases that path and clock errors cause.
 
-    The point is the origin of the paths. `slow_time` [s] may be unevenly spaced, and its middle element must be
-    mid-aperture. The solution is that of `ranges.exact_ranges`.
+    The target is at the origin of the paths. `slow_time` [s] may be unevenly spaced, and its middle element must be
+    mid-aperture. The method of solution is described in `ranges.exact_ranges`.
 
     Raises
     ------

@@ -109,7 +109,7 @@ class PointImages(NamedTuple):
     `effect` and `range_error` are for a point at the scene centre. `range_error` is the range error over `slow_time`
     without its constant and linear part. `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`.
     `points` (3, 2) are the ground points (29) for the three pieces of the full range error, computed with the
-    gradients that `points_by` names. By (25), the image of the scene centre is at the middle one of these points.
+    gradients that `points_by` names. By (25), the scene centre appears at the second of these points.
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
     the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error of
@@ -183,7 +183,7 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """Largest memory that is in use at a time, for images, phase history and image formation. [B]"""
+        """Peak memory used for images, phase history and image formation together. [B]"""
         images = _BYTES_PER_SCENE_PIXEL * self.in_scene.pixels + _BYTES_PER_ROTATED_PIXEL * self.rotated.pixels
         return images + _BYTES_PER_SAMPLE * self.pulses * self.frequencies + self.bytes_held
 
@@ -219,9 +219,9 @@ def simulate_point(
 ) -> PointImages:
     """Form images of points with the declared errors, before and after autofocus.
 
-    Errors have the signs and the coverage factor of the mission file. A covariance has no sign: its error is the most
-    probable error whose quadratic phase is one sigma, times the coverage factor. Vibration along the line of sight is
-    part of the data. Wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
+    Errors have the signs and the coverage factor of the mission file. A covariance has no sign. It is represented by
+    the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor. Vibration along
+    the line of sight is part of the data. Wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
     along the lines of equal range of the measured paths, and long enough for the smear and the paired echoes. The
     error-free image is formed by the same processor. Its data are those of points at the displaced positions,
     recorded as if the platforms flew the measured paths.
@@ -231,7 +231,7 @@ def simulate_point(
     mission : Mission
         The mission, as loaded.
     progress : callable
-        Called during image formation with the number of pixels times pulses that is done, and with the total number.
+        Called during image formation with the finished work and the total work, both as pixels times pulses.
     image_former : str
         One of `IMAGE_FORMERS`. The polar format forms only the rotated images; the image along (x, y) is then formed
         by backprojection. In the paper, too, Figure 5 is formed by (4) and Figure 6 by (14).
@@ -392,8 +392,8 @@ def simulate_point(
 def declared_errors(mission: Mission) -> Errors:
     """Declared errors of a mission in one flight, with the signs, the seed and the coverage factor of its file.
 
-    A covariance has no sign. Its error is the most probable error whose quadratic phase is one sigma, times the
-    coverage factor.
+    A covariance has no sign. It is represented by the most probable error with a quadratic phase of one sigma,
+    multiplied by the coverage factor.
     """
     analysis = Analysis(mission)
     sizes = {source.id: source.declared for source in analysis.stated if source.displaces}
@@ -627,8 +627,8 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
     There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
     so `level_db` is the mean power of a pixel. Both results are empty if `level_db` is None. A range cell has `finer`
     times as many pixels as a cross-range cell. If `finer` is above 1, scatterers up to a range cell beyond the patch
-    also contribute to it. They are out of focus, and their blur in cross-range grows by some cells for each line of
-    distance.
+    are included, because their responses extend into it. They are out of focus. Their blur in cross-range increases
+    by several cells with each line of distance from the patch.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)

@@ -68,7 +68,7 @@ def position_courses(
 
     The error is that of an inertial sensor or of a lever arm, or correlated position noise. The keys of the result
     are the names of the platforms. The values are (draws, times, 3): east, north, up. [m] If the error is common to
-    both platforms, both use the same random numbers along their axes. `declared` of the error only scales the result.
+    both platforms, both use the same random numbers along their axes. `error.declared` only scales the result.
     The ratios between the axes are those of the mission. `times` (times,) are slow times within the aperture. [s]
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
@@ -138,9 +138,9 @@ def _sensor_motions(
 def _swing_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the motion of the antenna that an attitude error causes through the lever arm, with a largest tilt of 1.
+    """Draw the antenna motion that an attitude error causes through the lever arm.
 
-    The acceleration error due to the tilt is not included.
+    The largest component of the attitude error has a standard deviation of 1 rad. The acceleration error due to the tilt is not included.
     """
     motion, swings = _motion(mission, error.owner), _swings(mission, error.owner, times)
     assert swings is not None
@@ -180,8 +180,8 @@ def _drawn_by_axis(
 ) -> Iterator[tuple[int, Floats, Floats]]:
     """Draw the errors of an inertial sensor for each axis, scaled so that the largest component of `figure` is 1.
 
-    Yields the index of the axis, the position error per unit of the acceleration that a unit error causes, and the
-    tilt. Both are (draws, times). An axis without an error is omitted.
+    Yields the index of the axis, the position error, (draws, times), and the tilt, (draws, times). The position error
+    assumes that an error of 1 causes an acceleration of 1. An axis without an error is omitted.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.name, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
@@ -244,17 +244,17 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
-    """Convert group delays by free electrons to their delay at a frequency of 1 Hz, `Errors.electrons`. [s·Hz²]
+    """Convert group delays due to free electrons to delays at a frequency of 1 Hz, as in `Errors.electrons`. [s·Hz²]
 
-    `group` are the delays at the centre frequency, (times,). [m] `times` are their slow times. [s]
+    `group` are the group delays at the centre frequency, (times,). [m] `times` are their slow times. [s]
     """
     return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
-    """Whether oscillator phases are simulated without mean and slope, because their setting is not stated.
+    """Whether the mission has oscillators for which the file does not state how they are set before the aperture.
 
-    The setting is the adjustment of the oscillators before the aperture, which the mission file may state.
+    The phases of such oscillators are simulated without mean and slope.
     """
     return any(error.displaces_unknown for error in random_errors(mission))
 
@@ -455,7 +455,7 @@ def phase_courses(
     """Draw the phases at the centre frequency that a random error causes, for one sigma, (draws, times). [rad]
 
     The error is that of an oscillator or of the synchronisation link, or a vibration. For the noise of an oscillator,
-    `declared` of the error is a factor on the amplitude. `times` are evenly spaced over the aperture. [s] Tones above
+    `error.declared` scales the amplitude. `times` are evenly spaced over the aperture. [s] Tones above
     `highest` [Hz] may be omitted if pulse exchanges do not fold them to lower frequencies.
     """
     return error.kind.find_in(_PHASE_DRAWS, error.subject.axis)(mission, error, times, draws, rng, highest)
@@ -560,11 +560,11 @@ def _linked_phases(
     highest: float,
     turn_phases: Sequence[Callable[[Floats], Floats]] = (),
 ) -> Floats | None:
-    """Draw the phases of an oscillator that remain after a link corrects a unit error, (draws, times). [rad]
+    """Draw the oscillator phases that remain after correction by a synchronisation link, (draws, times). [rad]
 
-    The link exchanges pulses at a stated interval, or the receiver uses the direct signal of the transmitter. The
-    result is None without such a link. `tones` are tones of the oscillator. Each is a pair of its amplitude without a
-    link and the tones that remain of it after the exchanges.
+    The phases are for a unit error. The link exchanges pulses at a stated interval, or the receiver uses the direct
+    signal of the transmitter. The result is None without such a link. `tones` has a pair for each tone of the
+    oscillator: its amplitude without a link, and its residual tones after the exchanges.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     if sync is None:
@@ -699,10 +699,10 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
 
 
 def _folded_tones(tones: Sequence[tuple[float, LeftTone]], aperture_time: float) -> list[tuple[float, float]]:
-    """Frequencies [Hz] and amplitudes of the slow tones that remain of oscillator tones after pulse exchanges.
+    """Frequencies [Hz] and amplitudes of the slow residual tones of an oscillator after pulse exchanges.
 
-    Pulse exchanges fold fast tones to low frequencies. `tones` are pairs of the amplitude of a tone without exchanges
-    and the tones that remain of it. The amplitudes are those of a unit error.
+    Pulse exchanges fold fast tones to low frequencies. `tones` has a pair for each tone of the oscillator: its
+    amplitude without exchanges, and its residual tones. All amplitudes are for a unit error.
     """
     return [
         (float(frequency), free * float(share))
@@ -885,8 +885,8 @@ class _Tones:
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Draw sums of the fast tones and of the noise above them, at evenly spaced times, (draws, times). [rad]
 
-        The spacing of the times must divide the period of the tones evenly. If `later` [s] is given, the result is
-        the change of the sum from each time to the time `later` after it.
+        The spacing of the times must divide the period of the tones evenly. If `later` is given, the result is the
+        change of the sum from each time t to t + `later`. [s]
         """
         count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
         square, white_variance = np.square(self.fast_size), self.rest**2
@@ -907,7 +907,7 @@ class _Tones:
     def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Draw sums of all tones at evenly spaced times, (draws, times). [rad]
 
-        If `later` [s] is given, the result is the change of the sum from each time to the time `later` after it.
+        If `later` is given, the result is the change of the sum from each time t to t + `later`. [s]
         """
         slow = self.draw_slow(draws, rng)
         sums = self.slow_at(times, slow)
@@ -940,9 +940,9 @@ class _Setting:
         self.fast = _Tones(fast_pieces, averaging) if fast_pieces else None
 
     def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """Phases in the aperture on the straight lines fitted over the averaging time, (draws, times). [rad]
+        """Evaluate the lines fitted over the averaging time at times in the aperture, (draws, times). [rad]
 
-        `slow` are the amplitudes of the slow tones that `_Tones.draw_slow` has drawn.
+        `slow` are the amplitudes of the slow tones, as drawn by `_Tones.draw_slow`.
         """
         lines = self.of_cosine @ slow[0].T + self.of_sine @ slow[1].T
         if self.fast is not None:

@@ -148,7 +148,7 @@ def first_order_range_error(platform: PlatformSymbols) -> Expr:
 
 
 def error_track(platform: PlatformSymbols) -> Matrix:
-    """Position error of a platform, (3,), with components that are general functions of slow time, as x̃_t(τ). [m]"""
+    """Position error of a platform, (3,); its components are general functions of slow time, such as x̃_t(τ). [m]"""
     return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
 
 

@@ -151,10 +151,10 @@ def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
 
 
 def amplitude_share(own: Expr, other: Expr) -> Expr:
-    """Fraction of an allowable amplitude that one platform gets if both platforms share it.
+    """Fraction of an allowable amplitude that a platform gets if both platforms share the amplitude.
 
-    `own` and `other` are the shares of power of this and of the other platform. The amplitudes of the platforms are
-    proportional to the square roots of the shares.
+    `own` is the power share of the platform, and `other` the power share of the second platform. The amplitudes are
+    proportional to the square roots of the power shares.
     """
     platform_part = positive("a")
     (solution,) = solve(Eq(platform_part * sqrt(other), (1 - platform_part) * sqrt(own)), platform_part)
@@ -171,8 +171,8 @@ def motion_of_phase(phase: Expr) -> Expr:
 def quartic_as_quadratic() -> Expr:
     """Coefficient of x² in the cubic polynomial that is fitted to x⁴ over −1 … 1: 6/7.
 
-    It follows from the projection on the second Legendre polynomial, the only one up to the third order that has an
-    x².
+    It follows from the projection on the second Legendre polynomial, because no other Legendre polynomial up to order
+    3 contains x².
     """
     x = real("x")
     second = legendre(2, x)
@@ -180,9 +180,10 @@ def quartic_as_quadratic() -> Expr:
 
 
 def quadratic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Quadratic phase at the aperture edge, of the cubic that is fitted to the polynomial β₀ … β₄ in slow time. [rad]
+    """Quadratic phase at the aperture edge for the range error with coefficients β₀ … β₄ in slow time. [rad]
 
-    The fit extends over the aperture, so that β₄ also has a part in the quadratic phase.
+    It is the quadratic phase of the cubic polynomial that is fitted to the range error over the aperture. Therefore
+    β₄ also contributes to it.
     """
     quadratic, quartic = (published.edge_phase(coefficients[n], n) for n in (2, 4))
     return quadratic + quartic_as_quadratic() * quartic
@@ -276,7 +277,7 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
 
 
 def _collected(coefficient: Expr) -> Expr:
-    """Write a coefficient as β̃ₙ of the table plus the terms that the displacement adds."""
+    """Write a coefficient as β̃ₙ, as given by `table`, plus the terms that the displacement adds."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 

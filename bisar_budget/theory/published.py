@@ -69,7 +69,7 @@ EQUAL_SHARE_QPE_RAD = pi / 8  # for each platform: half of the usual monostatic 
 class TableRow:
     """Row of a table: its printed number, the symbol of its error, and its cells from left to right.
 
-    `label` is what the row shows for the error, such as the error as a function of slow time.
+    `label` is the expression that is shown for the error, for example the error as a function of slow time.
     """
 
     number: int | None
@@ -94,8 +94,8 @@ class FormulaTable:
 class Equation:
     """Equation with its number in the paper; the number is empty for an equation that is not in the paper.
 
-    `origin` is `defined` for a definition and `derived` for an equation that SymPy derives. `slip` states what is
-    wrong in the printed paper, if anything.
+    `origin` is `defined` for a definition and `derived` for an equation that SymPy derives. `slip` describes the
+    mistake in the printed equation, if there is a mistake.
     """
 
     number: str
@@ -159,7 +159,7 @@ def edge_phase(beta: Expr, order: int) -> Expr:
 
 
 def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
-    """Magnitude of an error at which the phase, proportional to it, equals the budget."""
+    """Largest allowable magnitude of an error, at which `phase` equals `budget`; the phase is linear in the error."""
     size = Symbol("size", positive=True)
     (solution,) = solve(Eq(Abs(phase.subs(error, size)), budget), size)
     return solution
@@ -393,7 +393,7 @@ def tangent() -> tuple[Expr, Expr]:
 
 @cache
 def piece_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q_i in (30): of Q for platforms at their positions at τ_i.
+    """Adjugate (2, 2) and determinant of Q_i in (30), which is Q for the platform positions at τ_i.
 
     The ranges keep their values at mid-aperture.
     """

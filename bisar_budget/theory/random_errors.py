@@ -1,8 +1,8 @@
 """Random errors over one aperture: quadratic phase, cubic phase and ISLR from noise of sensors and clocks.
 
 An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace the response. The
-coefficient of order 2 times 3/2 is the quadratic phase at the aperture edge, and that of order 3 times 5/2 is the
-cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is (2n +
+coefficient of order 2 times 3/2 is the quadratic phase at the aperture edge. The coefficient of order 3 times 5/2 is
+the cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is (2n +
 1)·jₙ(πfT), so a spectrum is integrated with the square of this factor. A range error has the one-way phase k·x, k =
 2π/λ. All formulas are derived here; the paper has no random errors.
 
@@ -63,8 +63,8 @@ _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
 class Moments(NamedTuple):
     """Mean squares of the parts of an error over an aperture.
 
-    `quadratic` and `cubic` are those of the quadratic and of the cubic part at the aperture edge. `left` is that of
-    the remainder beyond the cubic part, averaged over the aperture.
+    `quadratic` and `cubic` are the mean squares of the quadratic and the cubic part at the aperture edge. `left` is
+    the mean square of the remainder beyond the cubic part, averaged over the aperture.
     """
 
     quadratic: Expr
@@ -105,11 +105,11 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Covariance function of an error that is zero at mid-aperture and that white noise drives from there.
+    """Covariance function of an error that starts from zero at mid-aperture and is driven by white noise.
 
-    The arguments of the function are two times m ≤ M after mid-aperture. `response` is the error at a time after a
-    unit impulse of the noise. Both sides of mid-aperture are independent: the error results from different noise
-    before and after mid-aperture.
+    The arguments of the function are two times m ≤ M after mid-aperture. `response` gives the error as a function of
+    the time since a unit impulse of the noise. The noise before mid-aperture is independent of the noise after
+    mid-aperture.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -205,7 +205,7 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 
 @cache
 def gauss_markov() -> Moments:
-    """Moments of a Gauss-Markov process, which is stationary, of variance 1 and correlation exp(−|t|/τ_c).
+    """Moments of a stationary Gauss-Markov process with variance 1 and correlation exp(−|t|/τ_c).
 
     They are expressed by the symbols `ratio`, T/(2τ_c), and `decay`, exp(−T/τ_c).
     """
@@ -222,8 +222,8 @@ def gauss_markov_place() -> PlaceMoments:
 def gauss_markov_slow() -> tuple[Expr, ...]:
     """Power series in `ratio` of the moments of `gauss_markov` and `gauss_markov_place`.
 
-    They are for a correlation time much longer than the aperture. The terms of the exact expressions nearly cancel
-    then.
+    They are used if the correlation time is much longer than the aperture, because the terms of the exact expressions
+    then nearly cancel.
     """
     exact = (*gauss_markov(), *gauss_markov_place())
     return tuple(_series(moment.subs(decay, exp(-2 * ratio)), ratio) for moment in exact)
@@ -233,7 +233,7 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
     """Series about zero of a sum of terms, each a power of a variable times exponentials, sines or cosines.
 
     The terms of the sum cancel at zero. The functions are replaced by their Taylor polynomials, which are exact up to
-    their order. SymPy is fast at the sums of powers that result.
+    their order. SymPy expands the resulting sums of powers quickly.
     """
     powers = range(4 * ORDER_COUNT + 2 * SERIES_TERMS)
     taylor = {
@@ -289,7 +289,7 @@ def tone_slow() -> tuple[Expr, ...]:
 
 
 def tone_fast() -> tuple[Expr, ...]:
-    """Mean squares and products of the parts of a fast tone, in the fields of `Moments` and `PlaceMoments`.
+    """Mean squares and mean products of the parts of a fast tone, as in `Moments` and `PlaceMoments`.
 
     Products of sine and cosine are averaged over a cycle. The results are in terms of `inverse`, the even inverse
     powers of `angle`. The part of order n is shifted in phase by n quarters of a cycle, so orders n and n + 2 have
@@ -329,7 +329,7 @@ def power_law(order: int) -> tuple[Expr, ...]:
 
 
 def passed() -> Expr:
-    """Amplitude that remains of a tone of amplitude 1 after linear interpolation between its samples: sinc²(f·T_s).
+    """Amplitude of a tone of amplitude 1 after sampling and linear interpolation: sinc²(f·T_s).
 
     It is the Fourier transform of a triangle.
     """
@@ -378,7 +378,7 @@ def vibrating_path() -> Expr:
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Power spectrum of an effect, such as a phase, that accelerations with the power spectrum S_a cause.
+    """Power spectrum of a phase or another effect, caused by accelerations with the power spectrum S_a.
 
     `amplitude` is the amplitude of the effect of a sinusoidal acceleration. It is proportional to the acceleration.
     """

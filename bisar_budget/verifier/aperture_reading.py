@@ -57,8 +57,8 @@ class ApertureReading(NamedTuple):
 
     `across_pixels` is the offset of the response along y′ from the middle of the image. It follows from the linear
     part of the phase. `walked_pixels` is the offset of the response's centre of gravity along x′ that the quadratic
-    part and higher parts of the phase cause. The part of the response that a slow time contributes lies, in range, at
-    the range error minus the product of its slope and the slow time. `coverage` is the fraction of the aperture that
+    part and higher parts of the phase cause: a pulse at slow time τ contributes at the range e(τ) − τ·e′(τ), where
+    e is the range error. `coverage` is the fraction of the aperture that
     the patch contains. It is 1 unless the smeared response leaves the patch.
     """
 

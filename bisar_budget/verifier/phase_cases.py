@@ -48,7 +48,7 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
     """Verify the limit on the quadratic phase of a vibration with less than one cycle per aperture.
 
-    An image is formed for the vibration along each of its axes alone, with the worst starting phase. The phases
+    An image is formed for each axis, with vibration along only this axis and with the worst starting phase. The phases
     measured in these images are added. For a vibration along several axes, the amplitudes are scaled until the sum of
     the phases computed from exact ranges reaches the limit.
     """
@@ -165,7 +165,7 @@ def dispersion(study: Study) -> Verdict:
 def edge(study: Study) -> Verdict:
     """Return the verdict `not_evaluated` for the phase difference between the centre and the edge of the scene.
 
-    The images are images of the scene centre. Only the tests compare this difference with images.
+    The images show only the scene centre. Only the tests of the package compare this difference with images.
     """
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
@@ -216,9 +216,9 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
     """Refocus an image with errors at their limit, and compare the phase that autofocus leaves with the budget.
 
     `budget` is the limit on the quadratic phase without autofocus gain. [rad] If `holds_hidden`, the remaining phase
-    includes the hidden phase, which autofocus cannot estimate because of the band and rotations. The hidden phase is
-    left out if only the pull-in range is verified, because separate rows judge it. Returns the fields of the verdict
-    that concern autofocus.
+    includes the hidden phase, which autofocus cannot estimate because the band and the turn of the line of sight do
+    not resolve it. The hidden phase is left out if only the pull-in range is verified, because it is part of the
+    verdicts on other rows. Returns the fields of the verdict that concern autofocus.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -444,9 +444,9 @@ def location(study: Study, requirement: float) -> Verdict:
     """Verify the location limit with one image that contains all declared errors.
 
     The errors are scaled by a common factor, so that their displacement by the gating model equals `requirement`. [m]
-    The limit is confirmed if the displacement in the image agrees with the gating model to 5 % of the requirement.
-    For the published model (25), the displacement by each single error must also agree with exact ranges. A limit of
-    this model is conservative if the displacements that disagree are only shorter than expected. Any other limit that
+    The limit is confirmed if the displacement in the image agrees with the gating model within 5 % of the
+    requirement. For the published model (25), the displacement by each single error must also agree with exact
+    ranges. The limit is conservative if (25) disagrees only by displacements that are too long. Any other limit that
     is not confirmed is optimistic.
     """
     blank = study.blank("mission.location_error", requirement, "m")
@@ -535,11 +535,12 @@ def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundV
 
 
 def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
-    """Whether a displacement is so short that sums of such displacements cannot exceed sums of the expected ones.
+    """Whether sums of displacements such as `actual` cannot be longer than sums of the expected displacements.
 
-    The longest sum of several displacements over all combinations of signs is at least 2/π of the sum of their
-    lengths. Therefore a missing length along the expected direction compensates for a component across it in this
-    ratio. The result is False if the expected displacement is zero.
+    If the signs of several displacements are chosen to maximise the length of their sum, this length is at least 2/π
+    times the sum of their lengths. A component across the expected direction is therefore harmless if the component
+    along this direction is shorter than expected by at least π/2 times as much. The result is False if the expected
+    displacement is zero.
     """
     length = math.hypot(*expected)
     if not length:

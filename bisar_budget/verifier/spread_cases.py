@@ -114,8 +114,8 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     With the published limits and equal shares of both platforms, the echoes of a sinusoidal vibration of one platform
     are 9 dB below the requirement. If both platforms vibrate in phase, the echoes are 3 dB below the requirement.
     Independent noise-like vibration of both platforms exceeds the requirement by 0.44 dB with a uniform window. With
-    the limits of the full model, sinusoidal vibration of both platforms in phase meets the requirement exactly. So
-    does noise-like vibration of both platforms.
+    the limits of the full model, sinusoidal vibration of both platforms in phase meets the requirement exactly, and
+    so does noise-like vibration of both platforms.
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
@@ -183,8 +183,8 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
     """Verdict on a group of vibration tones of neighbouring frequencies, scaled together to their common limit.
 
-    The amplitudes keep their declared ratios. The tones have the starting phases with which they make the highest
-    echo. `name` is the platform. `limit` is the amplitude of a single tone with the same echo. [m]
+    The amplitudes keep their declared ratios. The starting phases of the tones are chosen to give the highest echo.
+    `name` is the platform. `limit` is the amplitude of a single tone with the same echo. [m]
     """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
@@ -365,10 +365,10 @@ def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cyc
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verdict on the PSLR requirement, from the declared tones that together make the highest echo.
+    """Verdict on the PSLR requirement, from the declared tones that together produce the highest echo.
 
-    The tones have the starting phases with which they make this echo. They are scaled together so that the echo has
-    the required PSLR.
+    The starting phases of the tones are chosen to give the highest echo. The tones are scaled by a common factor, so
+    that the echo has the required PSLR.
     """
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
@@ -617,10 +617,10 @@ def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
-    """Ratio of the power of correlated noise at low frequencies to the power of its samples at low frequencies.
+    """Ratio of the low-frequency power density of correlated noise to that of its samples.
 
-    Samples at time steps Δ have more power than the noise itself: Δ·coth(Δ/2τ_c) instead of 2τ_c. Here τ_c is the
-    correlation time. [s]
+    Samples at time steps Δ have more power at low frequencies than the noise itself: Δ·coth(Δ/2τ_c) instead of 2τ_c,
+    where τ_c is the correlation time. [s]
     """
     step = float(times[1] - times[0])
     return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
@@ -713,9 +713,9 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on errors at a limit, whose added ISLR in an image is compared with the ISLR that `owner` may add.
+    """Verdict on errors at a limit: the ISLR that they add to an image is compared with the ISLR that `owner` may add.
 
-    `members` are random errors, of which time series are drawn. `white` is the rms phase of additional white noise.
+    `members` are random errors, each drawn as time series. `white` is the rms phase of additional white noise.
     [rad] Legendre orders up to `order` are removed from the time series and from the noise. `echoes` are tones, each
     given by its rms phase [rad] and its number of cycles per aperture; their starting phases are random. `cubic` is
     the rms of a random cubic phase over the aperture. [rad]
@@ -768,7 +768,7 @@ def _phases_of_delays(
 ) -> Iterator[Floats]:
     """Draw delays in the atmosphere, and yield the phase that they leave at the displaced image point. [rad]
 
-    The only array is (draws, times).
+    A single array is yielded, (draws, times).
     """
     group = delay_courses(study.mission, error, times, draws, rng)
     yield 2 * math.pi / study.collection.wavelength * _remaining_range_error(study, error, times, group)
@@ -854,7 +854,7 @@ class Mainlobe:
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """ISLR that errors add if the mainlobe loses `lost`, a fraction of the energy of the image. [dB]"""
+        """Increase of the ISLR, as a power ratio in dB, if errors move the fraction `lost` of the image energy to sidelobes."""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
@@ -862,8 +862,8 @@ class Mainlobe:
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
     """Measure the ISLR that random phases add, with as many draws as the verdict needs.
 
-    No more phases are drawn when the confidence interval is narrow and permits a single verdict, or when the maximum
-    number of draws is reached.
+    Drawing stops when the confidence interval is narrow and lies within the range of a single verdict, or when the
+    maximum number of draws is reached.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Create a verdict on a limit of the gating model that contains no measurements yet.
+        """Create a verdict, still without measurements, on a limit of the gating model.
 
         `limit` is in `unit`. `fields` are additional fields of the verdict.
         """
@@ -104,9 +104,9 @@ class Study:
 
     @property
     def is_full(self) -> bool:
-        """Whether displacement and cubic phase by the gating model follow from exact ranges.
+        """Whether the gating model computes displacement and cubic phase from exact ranges.
 
-        Otherwise they follow from Table I and (25) of Rigling & Moses.
+        Otherwise it computes them by (25) and Table I of Rigling & Moses.
         """
         return self.model != "published"
 
@@ -242,8 +242,8 @@ class Study:
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
         """Form the images for the errors of a row at its quadratic-phase limit, with the worse sign of the errors.
 
-        If the row is that of a single error, `limit` is the size of the error. If the row is that of a sum of errors,
-        `limit` is the budget for their phase. [rad] `room` is described in `images`.
+        For the row of a single error, `limit` is the size of the error. For the row of a sum of errors, `limit` is
+        the budget for the sum of their phases. [rad] `room` is described in `images`.
         """
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
@@ -252,8 +252,8 @@ class Study:
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
         """Form the images of a point with errors and of an error-free point, on patches large enough for the smear.
 
-        `room` is the smallest ratio of the width of a patch to the smear. It exists because autofocus fails in a
-        narrower patch. `range_cells` is the height of a patch without range walk, in range cells.
+        `room` is the minimum ratio of the width of a patch to the length of the smear; autofocus fails in a narrower
+        patch. `range_cells` is the height of a patch without range walk, in range cells.
 
         Raises
         ------
