@@ -38,10 +38,10 @@ def test_every_sentence_of_a_finding_has_its_code(path, model: str) -> None:
     assert mission["note_codes"] == [note.code for note in found.notes]
     assert [one["code"] for one in mission["warnings"]] == [warning.message.code for warning in found.warnings]
     assert {one["code"] for one in mission["warnings"]} <= CODES.keys()
-    for written, row in zip(mission["rows"], found.rows, strict=True):
-        assert written["reason_code"] == (row.reason.code if row.reason else None)
-        assert written["note_codes"] == [note.code for note in row.notes]
-        assert len(written["notes"]) == len(written["note_codes"])
+    for item, row in zip(mission["rows"], found.rows, strict=True):
+        assert item["reason_code"] == (row.reason.code if row.reason else None)
+        assert item["note_codes"] == [note.code for note in row.notes]
+        assert len(item["notes"]) == len(item["note_codes"])
 
 
 @pytest.mark.parametrize("name", ["rigling_moses_section_v_autofocus", "tandem_x"])
