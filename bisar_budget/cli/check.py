@@ -397,8 +397,8 @@ def check(
             reported = [each.name for mission in its_missions for each in getattr(mission, "overrides", ())]
             shown_day = judged_on if is_given or "--date" in reported else None
             options = dict.fromkeys(option for project in of for option in _options(project, shown_day, today))
-            made = Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
-            return with_work_trees(made) if illustrated else made
+            report = Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
+            return with_work_trees(report) if illustrated else report
 
         report = report_of(projects, files)
         if says_faults:

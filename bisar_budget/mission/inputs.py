@@ -54,9 +54,9 @@ def _input_files(mission: Mission) -> Iterator[InputFile]:
                 words = _USES_BESIDE[use].format(owner)
                 yield InputFile(words, file[0], os.path.join(folder, file[0]), file[1])
     catalogue = os.path.join(str(resource("specs", "sensors")), "")
-    for part in mission.parts:
-        is_of_catalogue = not is_file(part.name) and part.file.startswith(catalogue)
-        path = "" if is_of_catalogue else part.file
-        name = part.name if is_file(part.name) else os.path.basename(part.file)
+    for part_file in mission.parts:
+        is_of_catalogue = not is_file(part_file.name) and part_file.file.startswith(catalogue)
+        path = "" if is_of_catalogue else part_file.file
+        name = part_file.name if is_file(part_file.name) else os.path.basename(part_file.file)
         use = "part of the catalogue" if is_of_catalogue else "part"
-        yield InputFile(use, name, path, sha256(part.data).hexdigest())
+        yield InputFile(use, name, path, sha256(part_file.data).hexdigest())

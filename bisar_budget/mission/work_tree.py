@@ -46,7 +46,7 @@ def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
     """
     states: dict[str, WorkTree] = {}
     tops: dict[str, str] = {}
-    for file, others in inputs.items():
+    for file, input_paths in inputs.items():
         folder = os.path.dirname(os.path.realpath(file))
         if file == "-" or not _is_below_git(folder):
             states[file] = _NOT_IN_REPOSITORY
@@ -56,7 +56,7 @@ def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
             tops[folder] = top.removesuffix("\n") if is_read else ""
             states.setdefault(tops[folder], _state(tops[folder]) if is_read else WorkTree(reason=top or _UNREAD))
         state = states[tops[folder]]
-        states[file] = _with_inputs(state, tops[folder], [file, *others]) if state.commit else state
+        states[file] = _with_inputs(state, tops[folder], [file, *input_paths]) if state.commit else state
     return {file: states[file] for file in inputs}
 
 

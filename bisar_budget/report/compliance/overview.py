@@ -10,7 +10,7 @@ from bisar_budget.report.words.requirements import requirement_lines
 from bisar_budget.report.words.sentences import dashed, sentence, use_words, waiver_names
 
 
-class Entry(NamedTuple):
+class OverviewEntry(NamedTuple):
     """A mission in the overview: its name, the anchor of its chapter, its file, its status, and its findings.
 
     The findings are None for a file that cannot be used; `faults` is then the text with the number of its faults.
@@ -29,7 +29,7 @@ class Entry(NamedTuple):
         return next((requirement for requirement in requirements if requirement.key == key), None)
 
 
-def overview(entries: Sequence[Entry]) -> doc.Chapter:
+def overview(entries: Sequence[OverviewEntry]) -> doc.Chapter:
     """Return the first chapter of a report on several missions."""
     stated = [key for key in REQUIREMENT_NAMES if any(entry.requirement(key) for entry in entries)]
     columns = doc.heads("Mission", "Status", *(sentence(REQUIREMENT_NAMES[key]) for key in stated))
@@ -46,7 +46,7 @@ def overview(entries: Sequence[Entry]) -> doc.Chapter:
     return doc.Chapter("Overview of the missions", blocks, "summary", level=2)
 
 
-def _line(entry: Entry, keys: Sequence[str]) -> doc.Line:
+def _line(entry: OverviewEntry, keys: Sequence[str]) -> doc.Line:
     """Line of a mission, with a cell for each requirement of `keys`."""
     name: list[doc.Text] = [doc.Name(entry.name, entry.anchor), doc.Styled("own-id", doc.Name(entry.file))]
     status: list[doc.Text] = [doc.Badge(entry.status)]
@@ -70,7 +70,7 @@ def _use(requirement: JudgedRequirement) -> float | None:
     return None if requirement.value is None or requirement.is_unjudged else requirement.utilization
 
 
-def _margins(entries: Sequence[Entry], keys: Sequence[str]) -> Iterator[doc.Line]:
+def _margins(entries: Sequence[OverviewEntry], keys: Sequence[str]) -> Iterator[doc.Line]:
     """Yield a line for each requirement with the largest utilization, and with its mission and row."""
     for key in keys:
         judged = [
@@ -81,7 +81,7 @@ def _margins(entries: Sequence[Entry], keys: Sequence[str]) -> Iterator[doc.Line
         ]
         if not judged:
             continue
-        use, entry, line = max(judged, key=lambda found: found[0])
+        use, entry, line = max(judged, key=lambda margin: margin[0])
         row = line.requirement.use_row or line.requirement.row
         mission = doc.Name(entry.name, entry.anchor)
         decided: doc.Text = doc.Styled("id", doc.Name(row)) if row else "–"

@@ -42,8 +42,8 @@ def commit_words(work_tree: WorkTree) -> doc.Text:
 
 def _named(files: tuple[str, ...]) -> str:
     """Names of a few files, and the number of the others."""
-    others = len(files) - _LISTED_FILE_COUNT
-    return ", ".join(files[:_LISTED_FILE_COUNT]) + (f" and {others} more" if others > 0 else "")
+    unlisted_count = len(files) - _LISTED_FILE_COUNT
+    return ", ".join(files[:_LISTED_FILE_COUNT]) + (f" and {unlisted_count} more" if unlisted_count > 0 else "")
 
 
 def record(page: Page) -> doc.Chapter:

@@ -431,7 +431,7 @@ def declared_by_owner(findings: MissionFindings) -> list[Declaration]:
         words = row.subject.kind.replace("_", " ")
         kinds.setdefault((owner, row.evidence, owes_source), {})[words] = None
     declarations = [Declaration(owner, list(names), source, owes) for (owner, source, owes), names in kinds.items()]
-    return sorted(declarations, key=lambda declaration: _OWNERS.index(declaration.owner))
+    return sorted(declarations, key=lambda declaration: _DECLARING_OWNERS.index(declaration.owner))
 
 
-_OWNERS = ("transmitter", "receiver", "both platforms", "clock", "mission")
+_DECLARING_OWNERS = ("transmitter", "receiver", "both platforms", "clock", "mission")

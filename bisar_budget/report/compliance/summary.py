@@ -20,7 +20,7 @@ from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.compliance.annex import annex
-from bisar_budget.report.compliance.overview import Entry, overview
+from bisar_budget.report.compliance.overview import OverviewEntry, overview
 from bisar_budget.report.compliance.record import document_facts, has_record, record
 from bisar_budget.report.compliance.rows import (
     Declaration,
@@ -107,7 +107,7 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
     """
     count = len(report.missions)
     is_brief = count > 1 and style.detail != "full"
-    entries: list[Entry] = []
+    entries: list[OverviewEntry] = []
     missions, margins, annexes = [], [], []
     for number, mission in enumerate(report.missions, start=1):
         anchor = f"m{number}"
@@ -116,13 +116,13 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
             data, document = mission.data, Document()
             blocks: list[doc.Block] = [_faults(mission, name, anchor)]
             counts = counted(len(mission.faults), "fault")
-            entries.append(Entry(name, anchor, file, "error", faults=counts))
+            entries.append(OverviewEntry(name, anchor, file, "error", faults=counts))
         else:
             page = page_of(mission, style, anchor, is_brief=is_brief)
             file, name, data, document = page.file, page.name, page.mission.data, mission.document
             blocks = _brief(page) if is_brief else _summary(page)
             counts = _counts(mission)
-            entries.append(Entry(name, anchor, file, mission.status, mission))
+            entries.append(OverviewEntry(name, anchor, file, mission.status, mission))
             annexes += annex(page, several=count > 1)
         digest = "" if data is None else sha256(data).hexdigest()
         facts = _facts_of_file(file, digest, document, report.work_trees.get(mission.file), counts)

@@ -119,7 +119,7 @@ def _mission(mission: MissionFindings) -> dict[str, object]:
     return {
         "file": mission.file,
         "name": mission.name,
-        "document": mission.document._asdict(),
+        "document": {key: getattr(mission.document, key) for key in ("number", "issue", "author")},
         "status": mission.status,
         "waived_by": [waiver.id for waiver in mission.waived_by],
         "set": [change._asdict() for change in mission.changes],
