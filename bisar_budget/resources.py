@@ -1,4 +1,4 @@
-"""Files of the package, files of the user, and processors: the environment of a command."""
+"""Environment of a command: files of the package, files of the user, and the number of processors."""
 
 import os
 import stat
@@ -28,8 +28,8 @@ FILES_READ: set[tuple[int, int]] = set()
 class FilesHeld:
     """Contents of the files that a command reads, as first read, so that all its outputs use the same contents.
 
-    Contents are kept up to 64 MB in total. Of further files only a hash is kept. Such a file is refused if it has
-    changed when it is read again.
+    Contents are kept up to a total of 64 MB. If this is exceeded, only a hash of each further file is kept. Such a
+    file is refused if it has changed when it is read again.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class FilesHeld:
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
         """Content of a file as first read, at most `most` + 1 bytes.
 
-        `read` is called for a file that was not read before, or whose content is not kept.
+        `read` is called if the file was not read before, or if its content was not kept.
         """
         key = (file if file == "-" else os.path.normpath(file), most)
         held_content = self.known.get(key)
@@ -70,22 +70,25 @@ _held: FilesHeld | None = None  # None outside of a command: a caller of functio
 
 
 def hold_files() -> None:
-    """Begin a command: forget files that were read before, and keep each file's content from its first reading."""
+    """Begin a command: forget all files, and keep the content of each file from now on.
+
+    The content is kept as it is when a file is first read.
+    """
     global _held
     FILES_READ.clear()
     _held = FilesHeld()
 
 
 def release_files() -> None:
-    """End a command: later readings give the current content of files."""
+    """End a command. From now on, reading a file gives its current content."""
     global _held
     _held = None
 
 
 def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
-    """Content of a file as this command first read it, by `FilesHeld.content`.
+    """Content of a file as this command first read it, see `FilesHeld.content`.
 
-    Outside a command, the content that `read` returns.
+    Outside a command, the result is the content that `read` returns.
     """
     return read() if _held is None else _held.content(file, most, read)
 
@@ -103,9 +106,10 @@ _STREAMS = (
 
 
 def special_file(path: str) -> str:
-    """Kind of a file of which a read may wait or never end, such as `a named pipe`; empty for an ordinary file.
+    """Kind of a special file, such as `a named pipe`; empty for an ordinary file.
 
-    Open streams of this process, such as those of a shell's `<(…)`, do not count as special files.
+    Reading a special file may block or never end. Open streams of this process, such as the streams of `<(…)` in a
+    shell, do not count as special files.
     """
     if os.path.abspath(path).startswith(_STREAMS):
         return ""
@@ -225,7 +229,10 @@ def cores() -> int:
 
 
 def docstring(documented: Callable[..., object] | None) -> str:
-    """Docstring of a top-level class or function of a module; from the source if Python removed it (-OO)."""
+    """Docstring of a top-level class or function of a module.
+
+    If Python has removed it (-OO), it is read from the source.
+    """
     if sys.flags.optimize < 2:
         return documented.__doc__ or ""
     if documented is None:

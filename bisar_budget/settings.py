@@ -34,19 +34,21 @@ SettingValues = Mapping[str, Any]
 
 
 class SettingsError(Exception):
-    """The table of settings cannot be used; the message names the file and the key."""
+    """The table `[tool.bisar-budget]` cannot be used; the message names the file and the key."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Keys and values of the table; `file` is the file that contains it, for messages."""
+    """Keys and values of the table `[tool.bisar-budget]`; `file` is the file that contains it, for messages."""
 
     file: str
     values: SettingValues
 
 
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:
-    """Read the table that applies to a folder; None if no `pyproject.toml` in the folder or above has the table.
+    """Read the table `[tool.bisar-budget]` that applies to a folder; None if there is no such table.
+
+    It is read from the nearest `pyproject.toml` with this table, in the folder or above it.
 
     `files` is the source of the `pyproject.toml` files: the disk, or a git revision.
 

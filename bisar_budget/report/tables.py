@@ -36,7 +36,7 @@ SWEEP_FORMAT = "bisar-budget/sweep/1"
 class Described:
     """A sweep with the columns and metadata of its table file.
 
-    Columns of keys that vary are in the unit of the request. Other columns are in SI units.
+    Columns of varied keys are in the unit of the request. All further columns are in SI units.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Described:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Columns of the table, in the order in which they are written, with their units in the table."""
+        """Columns of the table in the order of writing, with their units in the table."""
         return tuple(
             column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
             for column in self.swept.columns
@@ -68,14 +68,14 @@ class Described:
         return {name: self.converted(name, values) for name, values in block.values.items()}
 
     def converted(self, name: str, values: Values) -> Values:
-        """Convert the SI values of the column `name` to the unit that the column has in the table."""
+        """Convert the values of the column `name` from SI to the unit of the column in the table."""
         if name not in self.numbers:
             return values
         return in_unit(self.numbers[name], np.asarray(values, float))
 
 
 def _overrides_text(overrides: Sequence[Override]) -> str:
-    """Write, as one line, the overrides from outside the mission file that affect statuses."""
+    """Write, on a single line, the overrides from outside the mission file that affect statuses."""
     return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
@@ -89,7 +89,7 @@ def write_csv(described: Described, blocks: Iterable[Part], path: str) -> None:
 
 
 def texts(described: Described, blocks: Iterable[Part]) -> Iterator[str]:
-    """Yield the text of a CSV file piece by piece: metadata, header, then the lines of each block."""
+    """Yield the content of a CSV file piece by piece: metadata, header, then the lines of each block."""
     yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items())
     yield ",".join(_quoted(spreadsheet_text(column.heading)) for column in described.columns) + "\n"
     for block in blocks:
@@ -105,7 +105,10 @@ def _quoted(text: str | None) -> str:
 
 
 def _cells(column: Column, values: Values) -> list[str]:
-    """Write the values of a column as texts for CSV. A value that many cases share is converted only once."""
+    """Write the values of a column as strings for CSV.
+
+    A value that several cases share is converted only once.
+    """
     if column.is_text:
         texts: list[str] = values.tolist()
         quoted = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
@@ -129,7 +132,7 @@ _MIN_GROUP_ROWS = 1 << 17  # of a row group, which readers load at once
 def write_parquet(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write a Parquet file with one row for each case, and with units and descriptions as metadata of the fields.
 
-    Texts are dictionary-encoded, and missing values are null. The metadata of the file is the same as in a CSV file.
+    Strings are dictionary-encoded, and missing values are null. The metadata of the file is the same as in a CSV file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -161,7 +164,10 @@ def _array(pa: ModuleType, column: Column, values: Values) -> "Array":
 
 
 def _groups(blocks: Iterable[Part]) -> Iterator[list[Part]]:
-    """Group blocks of cases, so that each group except the last has enough rows for a row group of Parquet."""
+    """Combine blocks of cases into groups.
+
+    Each group, except possibly the last, has enough rows for a row group of Parquet.
+    """
     group: list[Part] = []
     rows = 0
     for block in blocks:
@@ -183,7 +189,7 @@ _EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write a NetCDF file that follows the CF conventions.
 
-    A grid has one dimension for each key; a table has the dimension `case`. Texts are stored as flags, which are
+    A grid has one dimension for each key; a table has the dimension `case`. Strings are stored as flags, which are
     numbers with a list of their meanings. Reasons are strings, because they may differ in every case. Missing numbers
     are NaN.
     """
@@ -211,7 +217,10 @@ def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> Non
 
 
 def _hold_to_room(path: str) -> None:
-    """Append to a file that the library could not write, so that the system raises the `OSError` with the reason."""
+    """Append to a file that the library could not write.
+
+    The operating system then raises an `OSError` with the reason, such as a full disk.
+    """
     with open(path, "ab") as file:
         file.write(bytes(_PROBE_BYTES))
         file.flush()
@@ -240,7 +249,7 @@ def _attributes(column: Column) -> Mapping[str, str]:
 
 
 class _Variable:
-    """A column of a NetCDF file. Texts are stored as flag numbers."""
+    """A column of a NetCDF file. Strings are stored as flag numbers."""
 
     def __init__(self, file: "NetcdfFile", column: Column, names: tuple[str, ...]) -> None:
         self.column = column
@@ -266,7 +275,7 @@ class _Variable:
             begin = end
 
     def close(self) -> None:
-        """Write the attributes that list the flag numbers and their meanings, if the column contains texts."""
+        """Write the attributes that list the flag numbers and their meanings, if the column contains strings."""
         if self.column.is_text and not self.is_free:
             self.variable.flag_values = np.arange(len(self.codes), dtype="i4")
             self.variable.flag_meanings = " ".join("_".join(text.split()) or _EMPTY_MEANING for text in self.codes)
@@ -293,9 +302,10 @@ def slabs(start: int, stop: int, shape: tuple[int, ...]) -> Iterator[tuple[slice
 
 
 class TableFormat(NamedTuple):
-    """A table format: a function that writes it part by part, and the library that it needs from the extra `tables`.
+    """A table format: the function that writes it, and the library of the extra `tables` that it needs.
 
-    `write` raises `OSError` if it cannot write the file. It keeps only a few parts in memory.
+    `write` writes a table part by part, and keeps only a few parts in memory. It raises `OSError` if it cannot write
+    the file.
     """
 
     name: str
@@ -345,7 +355,7 @@ def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskA
     Returns
     -------
     xarray.Dataset
-        A variable for each column, with `units` and `long_name`. Missing numbers are NaN, missing texts are empty.
+        A variable for each column, with `units` and `long_name`. Missing numbers are NaN, missing strings are empty.
         Keys that vary are coordinates in the unit of the request. The attributes are the metadata of the table.
 
     Raises

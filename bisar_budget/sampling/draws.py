@@ -46,9 +46,9 @@ class Variable(NamedTuple):
     """One random variable with mean 0 and variance 1, and its effects.
 
     `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
-    variable causes, each with its size for a value of 1, in the unit of the error. `parts` is empty for random
-    errors, because only their effects are known. `effects` are the quadratic and cubic phase at the aperture edge
-    [rad], and the displacement east and north [m], for a value of 1.
+    variable causes. The size of each is given for a value of 1 of the variable, in the unit of the error. For random
+    errors `parts` is empty, because only their effects are known. `effects` are the quadratic and cubic phase at the
+    aperture edge [rad], and the displacement east and north [m], for a value of 1.
     """
 
     id: str
@@ -62,10 +62,10 @@ class Variable(NamedTuple):
 class HeldSum(NamedTuple):
     """A requirement with which draws are compared: its limit, and the errors and effects that are summed for it.
 
-    `owners` are the owners of the summed errors. `columns` are the indices, in `Variable.effects`, of the summed
-    effects. `limit` is in `unit`. The limit of a quadratic phase error includes the `gain` of autofocus. Autofocus
-    does not correct hidden phases, which the bandwidth and the turn of the line of sight do not resolve. Hidden
-    phases are therefore multiplied by `gain` before the comparison.
+    `owners` are the owners of the summed errors. `columns` are the indices of the summed effects in
+    `Variable.effects`. `limit` is in `unit`. The limit of a quadratic phase error includes the `gain` of autofocus.
+    Autofocus does not correct the hidden phase, which is the part of the phase that the bandwidth and the turn of the
+    line of sight do not resolve. The hidden phase is therefore multiplied by `gain` before the comparison.
     """
 
     id: str
@@ -86,8 +86,8 @@ class DrawsPiece(NamedTuple):
 class Drawing(NamedTuple):
     """All data that a process needs to compute pieces of the draws of a mission.
 
-    `name` is the name of the mission. `is_exact` tells whether every draw is computed by exact ranges. `chunk` is the
-    number of draws in a chunk; each variable has its own random stream in each chunk.
+    `name` is the name of the mission. `is_exact` states whether all draws are computed by exact ranges. `chunk` is
+    the number of draws in a chunk. Each variable has its own random stream in each chunk.
     """
 
     name: str
@@ -101,7 +101,10 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[DrawsPiece]:
-        """Divide the draws into pieces, always in the same way; yield no pieces if no requirement is judged."""
+        """Divide the draws into pieces; the division is always the same.
+
+        Yields no pieces if there is no requirement to compare with.
+        """
         size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
             yield DrawsPiece(start, min(start + size, self.draws))
@@ -193,12 +196,12 @@ def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
 class Sums:
     """Summed errors of one block of draws.
 
-    If `adds` is set, the quadratic phase is summed by owner and the other effects for the whole mission, and `square`
-    can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and `exact_square` can
-    be called. `motion` are then position, velocity and acceleration errors of both platforms, (2, 3, 3, draws).
-    `tags` are time tags of both platforms (2, draws), `registered` are errors of registered kinds with their sizes
-    (draws,), and `clock` are clock coefficients (4, draws). `alone` are the effects of errors of which only effects
-    are known: quadratic and cubic phase, and displacement east and north (4, draws).
+    If `adds` is set, the quadratic phase is summed by owner and each further effect over the whole mission, and
+    `square` can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and
+    `exact_square` can be called. In this case `motion` holds position, velocity and acceleration errors of both
+    platforms, (2, 3, 3, draws). `tags` holds time tag errors of both platforms (2, draws), `registered` holds errors
+    of registered kinds with their sizes (draws,), and `clock` holds clock coefficients (4, draws). `alone` is for
+    errors of which only the effects are known: quadratic and cubic phase, and displacement east and north (4, draws).
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -265,9 +268,9 @@ class Sums:
         return where[owner]
 
     def square(self, judged: HeldSum) -> Floats:
-        """Compute the square of the error that a requirement limits, by the linear model, (draws,).
+        """Square of the error that a requirement limits, by the linear model, (draws,).
 
-        The unit is the unit of the requirement, squared. The next call overwrites the returned array.
+        The unit is the square of the unit of the requirement. The next call overwrites the returned array.
         """
         square = self._square
         if judged.columns == (0,):
@@ -285,9 +288,9 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """Compute the square of the error that a requirement limits, by exact ranges, (draws,).
+        """Square of the error that a requirement limits, by exact ranges, (draws,).
 
-        The unit is the unit of the requirement, squared. The value is NaN for draws without an image.
+        The unit is the square of the unit of the requirement. The value is NaN for draws without an image.
         """
         owners = judged.owners
         if owners not in self._exact:
@@ -327,9 +330,9 @@ class Sums:
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Add the arrays of several owners; `by_owner` has the array of each owner.
+    """Add the arrays of several owners; `by_owner` holds the array of each owner.
 
-    Returns `nothing` if none of the owners has an array.
+    Returns `nothing` if `by_owner` has no array for any of them.
     """
     of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
     return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
@@ -338,7 +341,7 @@ def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats)
 class Drawer:
     """Computation of pieces of the draws, with the state of the random streams between two pieces.
 
-    If a piece comes after the last computed piece in the same chunk, the random streams of that piece are continued.
+    If a piece is in the same chunk as the previous piece and comes after it, its random streams are continued.
     """
 
     def __init__(self, drawing: Drawing) -> None:
@@ -379,7 +382,7 @@ class Drawer:
     def _go_to(self, start: int) -> None:
         """Move the random streams to the draw `start`.
 
-        If the streams are in another chunk, or past the draw, they start again at the beginning of its chunk.
+        If the streams are in another chunk, or beyond `start`, they restart at the beginning of the chunk.
         """
         chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
@@ -425,7 +428,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Choose the function that fills an array with normal draws: compiled by Numba if possible, otherwise NumPy's.
+    """Choose the function that fills an array with normal draws: compiled by Numba if possible, otherwise from NumPy.
 
     Numba is not used if it is not installed, if there is little memory, or if it cannot store compiled code.
     """
@@ -443,7 +446,7 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
     """Fill an array with normal draws, in a loop that Numba compiles.
 
-    The draws are identical to those of NumPy, to the last bit, and take two thirds of the time.
+    The draws are bit-identical to the draws of NumPy, and take two thirds of the time.
     """
     for index in range(out.size):
         out[index] = generator.standard_normal()
@@ -452,10 +455,10 @@ def _fill_each(generator: np.random.Generator, out: Floats) -> None:
 class _Stream:
     """Random stream of one variable in one chunk.
 
-    Each variable has its own stream, so that a further error in the file does not change the draws of other errors.
-    The stream of the first chunk is seeded with the seed of the drawing and the bytes of the variable's id. Later
-    chunks use child streams with an additional key. This key is larger than any byte, so that a child stream never
-    equals the stream of another variable with a longer id.
+    Each variable has its own stream, so that an additional error in the file does not change the draws of existing
+    errors. The stream of the first chunk is seeded with the seed of the drawing and the bytes of the variable's id.
+    Later chunks use child streams with an additional key. This key is larger than any byte, so that a child stream
+    never equals the stream of a variable with a longer id.
     """
 
     def __init__(
@@ -502,10 +505,10 @@ _JACOBI_ROUNDS = 30  # convergence is quadratic: a 6 x 6 matrix needs about five
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
     """Compute the eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, in any order.
 
-    Jacobi's method is used, not `numpy.linalg.eigh`. Equal eigenvalues are usual here: three alike axes without
-    correlations, or one correlation in several pairs. Their eigenvectors are then any basis, for which LAPACK
-    libraries differ, and a fixed sign and order do not determine it. The same seed would give different draws on
-    different machines.
+    Jacobi's method is used instead of `numpy.linalg.eigh`, because equal eigenvalues are common here: they result
+    from three similar axes without correlations, or from the same correlation in several pairs. The eigenvectors of
+    equal eigenvalues may be any basis. LAPACK libraries return different bases, even with a fixed sign and order, and
+    the same seed would then give different draws on different machines.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]

@@ -119,12 +119,13 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 
 
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
-    """Yield the independent variables of a random error of a sensor, a clock or the air.
+    """Yield the independent variables of a random error of a sensor, a clock or the atmosphere.
 
-    Their effects are the columns of a Cholesky factor. It factors the covariance of four effects: quadratic phase,
-    cubic phase, and displacement east and north. The first variable has the quadratic phase and all effects that are
-    correlated with it. Each further variable has the remaining part of the next effect. An error to which the
-    coverage factor does not apply is a bound: its effects are drawn with their full size and a random sign.
+    Their effects are the columns of the Cholesky factor of a covariance. It is the covariance of four effects:
+    quadratic phase, cubic phase, and displacement east and north. The first variable has the quadratic phase and the
+    correlated part of all further effects. Each further variable has the remaining part of the next effect. An error
+    to which the coverage factor does not apply is a bound: its effects are drawn with their full size and a random
+    sign.
     """
     if not error.declared or error.full.covariance is None or error.counted_in:
         return
@@ -161,9 +162,10 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Yield the requirements with which draws are compared: those of `check` to which declared errors contribute.
+    """Yield the requirements with which draws are compared.
 
-    `is_placed` tells whether the displacements of all errors are known. If not, the location error is left out.
+    These are the requirements of `check` to which declared errors contribute. `is_placed` states whether the
+    displacements of all errors are known. If not, the location error is left out.
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -196,8 +198,8 @@ class _Predictions:
     def combined(self, judged: HeldSum, rule: str) -> float | None:
         """Combined size of the errors that contribute to a requirement, in the unit of the requirement.
 
-        `rule` is a rule of `allocation.combine`. The size includes the coverage factor. None if the errors leave no
-        image.
+        `rule` is a rule of `allocation.combine`. The size includes the coverage factor. It is None if there is no
+        image with these errors.
         """
         members = [phase for phase in self.together.phases if phase.owner in judged.owners]
         if judged.columns == (0,):
@@ -209,9 +211,9 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Compute the variance that each error or covariance adds to the sum of a requirement, by its id.
+        """Variance that each error or covariance adds to the sum for a requirement, by id.
 
-        The unit is the unit of the requirement, squared.
+        The unit is the square of the unit of the requirement.
         """
         by_error: dict[str, float] = {}
         for variable in self.variables:
@@ -228,7 +230,7 @@ class _Predictions:
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
-        """Probability that a normally distributed sum, with the variances of the errors, is within the limit."""
+        """Probability that a normal sum with the variances of the errors is within the limit of a requirement."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
         xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
@@ -243,8 +245,8 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
     `xx`, `yy` and `xy` are the elements of its covariance. Let a and b be its principal sigmas, and let z be a
     standard normal vector with polar coordinates ρ and θ. The condition |(a z₁, b z₂)| ≤ r is
     ρ² ≤ r²/(a²cos²θ + b²sin²θ), and ρ² has an exponential distribution. The probability is therefore the mean of a
-    smooth periodic function of θ, which a sum with equal steps gives to rounding. For b = 0 it is Craig's form of
-    erf.
+    smooth periodic function of θ. A sum over equal steps computes this mean to rounding error. For b = 0 the
+    expression is Craig's form of erf.
     """
     middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
     large, small = middle + spread, max(0.0, middle - spread)
@@ -259,9 +261,9 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
-    """Confidence interval of a probability by Wilson's score; `quantile` is the quantile of the standard normal.
+    """Confidence interval of a probability by the Wilson score; `quantile` is the quantile of the standard normal.
 
-    The formula is also valid for a small number of draws of which none or all succeed.
+    The formula is also valid for a small number of draws, even if all of them succeed or fail.
     """
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)
@@ -297,7 +299,10 @@ def _requirement(
 
 
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Yield a warning if root-sum-square or a normal distribution does not describe the sum for a requirement."""
+    """Yield a warning if root-sum-square or a normal distribution is a poor description of the sum of errors.
+
+    The sum is the sum of the errors that a requirement limits.
+    """
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
         yield (

@@ -38,10 +38,10 @@ class PhaseGradientSettings:
     max_lines : int
         Largest number of range lines that are used. More lines take more time and improve the estimate little.
     target_count, targets_per_line : int
-        Largest number of targets that are used in the image, and in a range line.
+        Largest number of targets that are used in the whole image, and in each range line.
     secondary_fraction : float
-        Smallest power of a second or further target, as a fraction of the largest power of its line. Sidelobes are
-        weaker.
+        Smallest power of each target after the strongest in a line, as a fraction of the largest power of the line.
+        Sidelobes are weaker.
     false_alarm_probability : float
         Probability that a target is detected anywhere in an image of clutter alone.
     clutter_floor_ratio : float
@@ -55,8 +55,8 @@ class PhaseGradientSettings:
     narrowest_cells : int
         Smallest half width of a window. [cells]
     bridge_cells : int
-        Width up to which a gap next to the peak of the mean response is bridged. [cells] Half the distance of the
-        gap from the peak is added. Nulls within a smeared response are narrower.
+        Largest width of a gap in the mean response that is bridged next to the peak. [cells] For a gap farther from
+        the peak, the width is increased by half the distance. Nulls within a smeared response are narrower.
     coherent_rad : float
         RMS phase below which responses can be added coherently over the full aperture. [rad]
     significant_sigma : float
@@ -85,8 +85,8 @@ class Focused:
     """Image after autofocus, and the phase [rad] that autofocus removed from its spectrum along the second axis.
 
     `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`; `autofocus_in_scene_axes` returns a different length.
-    It is 0 outside the band of the aperture. It has no constant and no linear part over the band, because these
-    parts do not defocus: a linear phase only displaces.
+    It is 0 outside the band of the aperture. It has no constant or linear part over the band, because these parts do
+    not defocus: a linear phase only displaces the image.
     """
 
     image: Complexes
@@ -267,7 +267,8 @@ def _threshold(pixels: int) -> float:
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
     """Indices of the range lines that contain a target, and the mean clutter power of each line, (lines,) each.
 
-    The line with the largest ratio of peak power to clutter power is first. Both arrays are empty without a target.
+    The line with the largest ratio of peak power to clutter power is first. Both arrays are empty if there is no
+    target.
     """
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
@@ -321,8 +322,8 @@ def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> F
 def _smear(power: Floats, per_cell: float) -> int:
     """Half width of the mean response of range lines, aligned at their peaks. [samples]
 
-    At each distance from the peak, the stronger side of a line is averaged. `power` is (lines, samples), and
-    `per_cell` is the number of samples per resolution cell.
+    At each distance from the peak, the stronger side of each line is used for the mean. `power` is (lines, samples),
+    and `per_cell` is the number of samples per resolution cell.
     """
     samples = power.shape[1]
     column = power.argmax(axis=1)[:, None]
@@ -366,11 +367,11 @@ def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indic
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
     """Shift the interpolated peak of each response to sample 0, by a phase ramp over the aperture.
 
-    `aperture` (targets, count) are the spectra of the responses. `column` (targets,) is the strongest sample of each
-    response, in a line of `samples` samples. Newton's method on the power finds the interpolated peak.
+    `aperture` (targets, count) holds the spectra of the responses. `column` (targets,) is the strongest sample of
+    each response, in a line of `samples` samples. The interpolated peak of the power is found by Newton's method.
 
-    A window that is off the peak by a fraction of a sample bends the phase at the edges of the aperture. Because the
-    bend has the same direction in each iteration, the estimate would drift without this shift.
+    If a window is off the peak by a fraction of a sample, it bends the phase at the edges of the aperture. Without
+    this shift, the bend would have the same direction in each iteration, and the estimate would drift.
     """
     count = aperture.shape[1]
     turn = 2 * math.pi / samples
@@ -402,9 +403,9 @@ def _basis(strength: Floats, order: int) -> Floats:
     """Smooth basis functions of a phase error, (count, functions): polynomials up to the cubic, then cosines.
 
     They are orthonormal with the power over the aperture, `strength` (count,), as weight. Their number is `order`, at
-    most count // 2. The polynomials contain the slopes at both ends, so that the cosine series of a smooth phase
-    converges fast. The n-th cosine completes n/2 cycles over the aperture. Weak samples, into which the response
-    leaks in an image of finite extent, have little weight.
+    most count // 2. The polynomials represent the slopes at both ends, so that the cosine series of a smooth phase
+    converges fast. The n-th cosine completes n/2 cycles over the aperture. Samples outside the response, into which
+    it leaks in an image of finite extent, have little power and therefore little weight.
     """
     aperture_place = _aperture_places(strength.size)
     columns = [aperture_place**power for power in range(4)]
@@ -418,9 +419,9 @@ def _basis(strength: Floats, order: int) -> Floats:
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
     """Estimate the phase error over the aperture that is common to windowed and centred responses, (count,). [rad]
 
-    `responses` (targets, count) are their spectra. `samples` is the number of samples of a range line. A large phase
-    is estimated by the gradient kernel alone. A small phase is refined by the principal eigenvector, without the
-    components that are not significant.
+    `responses` (targets, count) holds the spectra of the responses. `samples` is the number of samples of a range
+    line. A large phase is estimated by the gradient kernel alone. A small phase is refined by the principal
+    eigenvector, and its insignificant components are removed.
     """
     count = responses.shape[1]
     # Gradient kernel: the maximum-likelihood phase difference of neighbours, integrated.
@@ -451,10 +452,11 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
 
 
 def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
-    """Phase slope over the second sub-aperture of each pair minus that over the first, (pairs,). [rad/sample]
+    """Difference between the phase slopes over the two sub-apertures of each pair, (pairs,). [rad/sample]
 
-    `aperture` is (lines, samples), and each of `segments` holds the indices of the samples of a sub-aperture. The
-    result is None if the images of a pair do not correlate.
+    It is the slope over the second sub-aperture minus the slope over the first. `aperture` is (lines, samples), and
+    each item of `segments` holds the sample indices of a sub-aperture. The result is None if the images of a pair do
+    not correlate.
     """
     samples = 2 * aperture.shape[1]  # the power of an image has twice its bandwidth
     powers = [

@@ -63,25 +63,25 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 class RangeLines:
     """Grid of ground pixels along lines of equal range and of equal Doppler.
 
-    On this grid a response is the product of its two cuts. On a straight grid it is not if a platform is near. The
-    cross-range cut of the response then follows an ellipse, and the range sidelobes follow lines of equal Doppler.
+    On this grid a point response is the product of its two cuts. On a straight grid this does not hold if a platform
+    is near, because the cross-range cut follows an ellipse, and the range sidelobes follow lines of equal Doppler.
     Here the pixels of a line have the same range sum at the aperture midpoint, and the pixels of a column have the
     same change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend
     around a platform.
 
     Doppler may reverse within the aperture if the line of sight turns far, as on a full circle. The range sums at the
-    start, middle and end of the aperture then do not determine a point. The pixels are then along straight lines, and
-    sample the full wave-number support.
+    start, middle and end of the aperture then do not determine a point. In this case the pixels are placed along
+    straight lines, and sample the full wave-number support.
 
-    `transmitter` and `receiver` are the measured positions at an odd number of times, evenly over the aperture,
-    (times, 3). [m]
+    `transmitter` and `receiver` are the measured positions at an odd number of times that are evenly spaced over the
+    aperture, (times, 3). [m]
     """
 
     transmitter: Floats
     receiver: Floats
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """Gradients over the ground of the range sum at mid-aperture, and of its change over the aperture. [m/m]
+        """Ground gradients of the range sum at mid-aperture and of its change over the aperture. [m/m]
 
         Points (..., 2) give two arrays (..., 2), in this order. The change is the last range sum minus the first.
         """
@@ -89,7 +89,7 @@ class RangeLines:
         return middle, last - first
 
     def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Gradients over the ground of the range sum at the start, middle and end of the aperture. [m/m]
+        """Ground gradients of the range sum at the start, middle and end of the aperture. [m/m]
 
         Points (..., 2) give three arrays (..., 2).
         """
@@ -97,9 +97,9 @@ class RangeLines:
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
 
     def _gradients(self, points: Floats, times: slice | NDArray[np.intp]) -> Floats:
-        """Gradients over the ground of the range sum at selected times. [m/m]
+        """Ground gradients of the range sum at selected times. [m/m]
 
-        `times` are indices of times of the paths. Points (..., 2) give (..., times, 2).
+        `times` are indices into the times of the paths. For points (..., 2) the result is (..., times, 2).
         """
         sums: Floats = np.zeros(1)
         for platform in (self.transmitter[times], self.receiver[times]):
@@ -119,8 +119,8 @@ class RangeLines:
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
         """Ground vector along the line of equal Doppler that increases the range sum by one metre, (..., 2). [m/m]
 
-        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). If this vector would be too
-        long, the result is perpendicular to the lines of equal range instead.
+        `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). Where this vector would be too
+        long, a vector perpendicular to the lines of equal range is returned instead.
         """
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
@@ -133,16 +133,16 @@ class RangeLines:
         return self._range_sum(points, [len(self.transmitter) // 2])
 
     def carrier(self, points: Floats) -> Floats:
-        """Compute the range sum whose phase is removed from images, for ground points (..., 2 or 3), (...). [m]
+        """Range sum whose phase is removed from images, for ground points (..., 2 or 3), (...). [m]
 
-        It is the range sum at mid-aperture, or its mean over time if Doppler reverses within the aperture.
+        It is the range sum at mid-aperture, or the mean range sum over time if Doppler reverses within the aperture.
         """
         return self._range_sum(
             points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
         )
 
     def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
-        """Mean of the range sum of ground points (..., 2 or 3) over selected indices of time, (...). [m]"""
+        """Range sum of ground points (..., 2 or 3), averaged over the times with the given indices, (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
         for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
             total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
@@ -157,7 +157,10 @@ class RangeLines:
         return float(by_doppler @ _left(by_range)) < 0
 
     def axes(self, centre: GroundVector) -> Floats:
-        """Unit vectors along x′, towards the platforms, and along y′, counter-clockwise of x′, as columns (2, 2)."""
+        """Unit vectors along x′ and y′, as the columns of an array (2, 2).
+
+        The axis x′ points towards the platforms, and y′ is 90° counter-clockwise of x′.
+        """
         by_range = self.gradients(np.asarray(centre, dtype=float))[0]
         towards = -by_range / float(np.hypot(*by_range))
         return np.stack((towards, _left(towards)), axis=1)
@@ -182,9 +185,9 @@ class RangeLines:
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cell sizes that set the pixel spacing, across and along the lines of equal range. [m]
 
-        They are the results of `cells`, or smaller across the lines of equal range. Over a long aperture near a
-        platform the wavefronts are strongly curved. A point is then out of focus even at pixels of its column less
-        than a cell away, and the spectrum along the column is wider than the bandwidth.
+        They are the results of `cells`, except that the size across the lines may be smaller. If the aperture is long
+        and a platform is near, the wavefronts are strongly curved. A point is then out of focus even at pixels in its
+        column that are less than a cell away, and the spectrum along the column is wider than the bandwidth.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -216,8 +219,8 @@ class RangeLines:
         """Phasor that removes the phase of the `carrier` range from an image at points (..., 3), (...).
 
         A backprojected image has the phase of the range to each pixel. Close to a platform this phase is a chirp
-        across the patch, which hides the spectrum of the aperture from autofocus. The spectrum remains when the phase
-        is removed.
+        across the patch, which hides the spectrum of the aperture from autofocus. Removing the phase reveals this
+        spectrum.
         """
         carrier_range = self.carrier(points) - self.carrier(np.zeros(2))
         phase: Complexes = np.exp(-2j * math.pi / wavelength_m * carrier_range)
@@ -231,7 +234,7 @@ class RangeLines:
         centre : (2,) float
             East and north of the pixel (nx // 2, ny // 2). [m]
         spacing : (2,) float
-            Distance of neighbouring pixels at the centre, across the lines of equal range and along them. [m]
+            Distance between neighbouring pixels at the centre, across the lines of equal range and along them. [m]
         shape : (2,) int
             Number nx of lines, counted towards the platforms, and number ny of pixels of a line, counted
             counter-clockwise of that direction.
@@ -284,9 +287,9 @@ class RangeLines:
 class Chip(NamedTuple):
     """Image of a patch, (nx, ny), and the ground points of its pixels, (nx, ny, 3). [m]
 
-    `spacing` is the distance of neighbouring pixels in the middle of the patch, along x′ and y′. [m] For the measured
-    paths, lines of pixels along y′ have equal range, and columns have equal Doppler. The phase of the range to each
-    pixel at mid-aperture is removed, so the spectrum of the image is that of the aperture, centred at zero.
+    `spacing` is the distance between neighbouring pixels in the middle of the patch, along x′ and y′. [m] For the
+    measured paths, lines of pixels along y′ have equal range, and columns have equal Doppler. The phase of the range
+    to each pixel at mid-aperture is removed, so the image has the spectrum of the aperture, centred at zero.
     """
 
     image: Complexes
@@ -388,7 +391,10 @@ class PointCollection:
         return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.radar, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
-        """Lines of equal range for the measured paths without vibration, on which a processor places its pixels."""
+        """Lines of equal range along which a processor places its pixels.
+
+        They are computed for the measured paths without vibration.
+        """
         times = np.linspace(-1.0, 1.0, _PATH_SAMPLES) * self.aperture_time / 2
         return RangeLines(*(path.measured for path in self.flight(errors.smooth(), times).paths))
 
@@ -443,8 +449,8 @@ class PointCollection:
     ) -> tuple[Chip, Chip]:
         """Form the image of the scene centre with errors, and a reference image without errors, on the same pixels.
 
-        `ground_point` is the displaced point at which the scene centre appears, and the centre of both images. The
-        reference image is that of a scatterer at `ground_point`.
+        `ground_point` is the displaced point at which the scene centre appears. It is the centre of both images. The
+        reference image shows a scatterer at `ground_point`.
         """
         return (
             self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
@@ -476,7 +482,10 @@ class PointCollection:
         return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """Number of frequencies with which range profiles, with their range walk, do not repeat within the patch."""
+        """Number of frequencies for which range profiles do not repeat within the patch.
+
+        Range walk is included.
+        """
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, len(flight.clock) // 2, -1):
@@ -494,7 +503,7 @@ class PointCollection:
         """Raise a `ValueError` if a patch aliases, is too large or needs too much memory.
 
         The patch is `cells` resolution cells wide along y′ and `range_cells` along x′. The memory is checked for the
-        number of pulses that the patch needs, because additional pulses would not change its image.
+        number of pulses that the patch needs; additional pulses would not change its image.
         """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")

@@ -2,17 +2,17 @@
 
 Import this module only where a missing Numba is handled.
 
-Range profiles are refined until a B-spline of two taps (linear) or four taps (cubic) can interpolate them. The
-spectrum is divided by the transform of the spline, which is known in closed form. On a lattice of pixels, the range
-is computed exactly in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For
-other pixels it is computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or
-integers. Only the fractions that remain are in single precision. The accuracy therefore does not depend on the
-position of the scene and on the wavelength.
+Range profiles are refined until a cubic B-spline, which has four taps, can interpolate them. The spectrum is divided
+by the transform of the spline, which is known in closed form. On a lattice of pixels, the range is computed exactly
+in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For other pixels it is
+computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or integers. Only the
+fractions that remain are in single precision. The accuracy therefore does not depend on the position of the scene and
+on the wavelength.
 """
 
 import math
 from collections.abc import Iterator
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -29,15 +29,13 @@ from bisar_budget.simulator.image_formation import (
 )
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
-Spline = Literal["linear", "cubic"]
-
 _SEGMENT_LENGTH = 32  # pixels in one expansion; they fill two or four vector registers of a processor
 _RUN_LENGTH = 64  # scattered pixels whose ranges are bounded together
 _TILE_ROWS = 16  # lines of one tile; the part of a pulse that a tile reads stays in a processor's first cache
 _FFT_OVERSAMPLING_FACTOR = 2  # oversampling of profiles that the FFT gives
 _KERNEL_SAMPLES = 8  # width of the kernel that refines profiles; its error is -140 dB at this oversampling
-_REFINEMENT_FACTORS = {"linear": 16, "cubic": 8}  # refined samples per sample from the FFT
-_SPLINE_ORDERS = {"linear": 1, "cubic": 3}
+_REFINEMENT_FACTOR = 8  # refined samples per sample from the FFT
+_SPLINE_ORDER = 3  # of the B-spline, which has one tap more
 _RANGE_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # size of the profiles in memory at once, about that of a processor's last cache
 _MAX_SAMPLES_PER_PIXEL = 8  # with more, refining takes longer than reading each pixel with the kernel itself
@@ -104,19 +102,28 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     return Lattice(origin, across, along, (lines, count))
 
 
+<<<<<<< HEAD
 def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
     """Form an image by compiled backprojection, with the result of `image_formation.backprojection`.
 
     All inputs must be finite.
+=======
+def backproject(history: PhaseHistory, points: Floats) -> Complexes | None:
+    """Form an image by backprojection, as `image_formation.backprojection` does; all inputs must be finite.
+>>>>>>> w_r4
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     points : (..., 3) ndarray
+<<<<<<< HEAD
         Positions of the pixels. [m] The function is fastest if they are evenly spaced.
     spline : "linear" or "cubic"
         Spline that interpolates the range profiles.
+=======
+        Positions of the pixels. It is fastest if they are on a lattice. [m]
+>>>>>>> w_r4
 
     Returns
     -------
@@ -144,8 +151,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         padded = np.zeros(
             (lattice.shape[0], -(-lattice.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH), dtype=complex
         )
-        for block in _profile_blocks(history, within, spline):
-            _add_lattice(*block, lattice.origin, lattice.across, lattice.along, spline == "cubic", padded)
+        for block in _profile_blocks(history, within):
+            _add_lattice(*block, lattice.origin, lattice.across, lattice.along, padded)
         image = padded[:, : lattice.shape[1]].reshape(shape)
         image = np.ascontiguousarray(image if shape == points.shape[:-1] else image.T)
     else:
@@ -155,8 +162,8 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         within = _needed(history, nearest, farthest, image.size)
         if within is None:
             return None
-        for block in _profile_blocks(history, within, spline):
-            _add_points(*block, axes, spline == "cubic", image.reshape(-1))
+        for block in _profile_blocks(history, within):
+            _add_points(*block, axes, image.reshape(-1))
     image /= history.samples.size
     return image
 
@@ -217,7 +224,7 @@ def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: in
     count = float((farthest - nearest).max()) * per_metre + 2 * _RANGE_MARGIN_SAMPLES + 1
     if count > max(
         length + 4 * _RANGE_MARGIN_SAMPLES,
-        min(_MAX_SAMPLES_PER_PIXEL * pixels, _BLOCK_BYTES / (8 * max(_REFINEMENT_FACTORS.values()))),
+        min(_MAX_SAMPLES_PER_PIXEL * pixels, _BLOCK_BYTES / 2 / (8 * _REFINEMENT_FACTOR)),
     ):
         return None
     return _Needed(
@@ -253,8 +260,13 @@ def _kernel_transform(angle: Floats) -> Floats:
     return transform
 
 
+<<<<<<< HEAD
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
     """Yield the refined part of each range profile that the pixels need, in blocks of pulses that fit into a cache.
+=======
+def _profile_blocks(history: PhaseHistory, needed: _Needed) -> Iterator[_Block]:
+    """Refine the part of each profile that the pixels need, in blocks of as many pulses as fit into a cache.
+>>>>>>> w_r4
 
     The part is found from the pixels and not from a sphere around the patch. A resolution cell may be a hundred times
     longer than wide, and a sphere around such cells would need many more samples. All blocks share the same memory,
@@ -262,8 +274,8 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
-        _REFINEMENT_FACTORS[spline],
-        _SPLINE_ORDERS[spline],
+        _REFINEMENT_FACTOR,
+        _SPLINE_ORDER,
     )
     coarse = cells_per_metre(history, length)
     harmonic = harmonics(history)
@@ -426,57 +438,45 @@ def _cubic(v):
 
 
 @_compiled
+<<<<<<< HEAD
 def _fetch(profile, index, cubic, fetched):
     """Copy the profile samples that each pixel needs to `fetched`: two for a linear spline, four for a cubic."""
+=======
+def _fetch(profile, index, fetched):
+    """Copy the four profile samples that each pixel needs to `fetched`."""
+>>>>>>> w_r4
     for i in range(index.shape[0]):
-        if cubic:
-            for j in range(_SEGMENT_LENGTH):
-                n = np.uint64(np.uint32(index[i, j] - _I(1)))
-                s0, s1 = profile[n], profile[n + np.uint64(1)]
-                s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
-                fetched[i, 4 * j], fetched[i, 4 * j + 1], fetched[i, 4 * j + 2], fetched[i, 4 * j + 3] = (
-                    s0,
-                    s1,
-                    s2,
-                    s3,
-                )
-        else:
-            for j in range(_SEGMENT_LENGTH):
-                n = np.uint64(np.uint32(index[i, j]))
-                s0, s1 = profile[n], profile[n + np.uint64(1)]
-                fetched[i, 2 * j], fetched[i, 2 * j + 1] = s0, s1
+        for j in range(_SEGMENT_LENGTH):
+            n = np.uint64(np.uint32(index[i, j] - _I(1)))
+            s0, s1 = profile[n], profile[n + np.uint64(1)]
+            s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
+            fetched[i, 4 * j], fetched[i, 4 * j + 1], fetched[i, 4 * j + 2], fetched[i, 4 * j + 3] = s0, s1, s2, s3
 
 
 @_compiled
+<<<<<<< HEAD
 def _add_taps(taps, between, cycles, cubic, real, imag):
     """Add the interpolated profile value of a pulse, times the phasor of the carrier, to each pixel.
 
     `taps` are the samples that `_fetch` copied. `real` and `imag` are the parts of the image.
     """
+=======
+def _add_taps(taps, between, cycles, real, imag):
+    """Add the interpolated value of the profile, times the phasor of the carrier, to each pixel."""
+>>>>>>> w_r4
     for i in range(real.shape[0]):
-        if cubic:
-            for j in range(_SEGMENT_LENGTH):
-                cosine, sine = _phasor(cycles[i, j])
-                w0, w1, w2, w3 = _cubic(between[i, j])
-                t = 8 * j
-                re = w0 * taps[i, t] + w1 * taps[i, t + 2] + w2 * taps[i, t + 4] + w3 * taps[i, t + 6]
-                im = w0 * taps[i, t + 1] + w1 * taps[i, t + 3] + w2 * taps[i, t + 5] + w3 * taps[i, t + 7]
-                real[i, j] += re * cosine - im * sine
-                imag[i, j] += re * sine + im * cosine
-        else:
-            for j in range(_SEGMENT_LENGTH):
-                cosine, sine = _phasor(cycles[i, j])
-                v = between[i, j]
-                re = taps[i, 4 * j] + v * (taps[i, 4 * j + 2] - taps[i, 4 * j])
-                im = taps[i, 4 * j + 1] + v * (taps[i, 4 * j + 3] - taps[i, 4 * j + 1])
-                real[i, j] += re * cosine - im * sine
-                imag[i, j] += re * sine + im * cosine
+        for j in range(_SEGMENT_LENGTH):
+            cosine, sine = _phasor(cycles[i, j])
+            w0, w1, w2, w3 = _cubic(between[i, j])
+            t = 8 * j
+            re = w0 * taps[i, t] + w1 * taps[i, t + 2] + w2 * taps[i, t + 4] + w3 * taps[i, t + 6]
+            im = w0 * taps[i, t + 1] + w1 * taps[i, t + 3] + w2 * taps[i, t + 5] + w3 * taps[i, t + 7]
+            real[i, j] += re * cosine - im * sine
+            imag[i, j] += re * sine + im * cosine
 
 
 @_parallel
-def _add_lattice(
-    profiles, first, transmitter, receiver, reference, per_metre, cycles, origin, across, along, cubic, image
-):
+def _add_lattice(profiles, first, transmitter, receiver, reference, per_metre, cycles, origin, across, along, image):
     """Add the contributions of a block of pulses to the pixels of a lattice, in tiles of line segments."""
     segments = image.shape[1] // _SEGMENT_LENGTH
     groups = (image.shape[0] + _TILE_ROWS - 1) // _TILE_ROWS
@@ -487,7 +487,7 @@ def _add_lattice(
         real, imag = np.zeros((rows, _SEGMENT_LENGTH), np.float32), np.zeros((rows, _SEGMENT_LENGTH), np.float32)
         index, between = np.empty((rows, _SEGMENT_LENGTH), np.int32), np.empty((rows, _SEGMENT_LENGTH), np.float32)
         carrier = np.empty((rows, _SEGMENT_LENGTH), np.float32)
-        fetched = np.empty((rows, (4 if cubic else 2) * _SEGMENT_LENGTH), np.int64)
+        fetched = np.empty((rows, 4 * _SEGMENT_LENGTH), np.int64)
         taps = fetched.view(np.float32)
         whole, fraction = np.empty((2, rows), np.int32), np.empty((2, rows), np.float32)
         turn, order = np.empty((3, rows), np.int32), np.empty((3, rows), np.float32)
@@ -504,8 +504,8 @@ def _add_lattice(
             _expand(middle, receiver[pulse], along, ranges)
             _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
             _sample_points(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
-            _fetch(profiles[pulse], index, cubic, fetched)
-            _add_taps(taps, between, carrier, cubic, real, imag)
+            _fetch(profiles[pulse], index, fetched)
+            _add_taps(taps, between, carrier, real, imag)
         for i in range(rows):
             for j in range(_SEGMENT_LENGTH):
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])
@@ -619,8 +619,13 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 
 @_parallel
+<<<<<<< HEAD
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
     """Add the contributions of a block of pulses to scattered pixels (3, n), with the exact range of every pixel."""
+=======
+def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, image):
+    """Add the contributions of a block of pulses to scattered pixels, (3, n), each at its exact range."""
+>>>>>>> w_r4
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)
@@ -631,14 +636,14 @@ def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cy
             tile_points[axis, count:] = points[axis, start + count - 1]
         sums, index = np.empty(rows * _SEGMENT_LENGTH), np.empty((rows, _SEGMENT_LENGTH), np.int32)
         between, turn = np.empty((rows, _SEGMENT_LENGTH), np.float32), np.empty((rows, _SEGMENT_LENGTH), np.float32)
-        fetched = np.empty((rows, (4 if cubic else 2) * _SEGMENT_LENGTH), np.int64)
+        fetched = np.empty((rows, 4 * _SEGMENT_LENGTH), np.int64)
         taps = fetched.view(np.float32)
         real, imag = np.zeros((rows, _SEGMENT_LENGTH), np.float32), np.zeros((rows, _SEGMENT_LENGTH), np.float32)
         for pulse in range(profiles.shape[0]):
             _sums(tile_points, transmitter[pulse], receiver[pulse], reference[pulse], sums)
             _split_points(sums, per_metre, first[pulse], cycles, index, between, turn)
-            _fetch(profiles[pulse], index, cubic, fetched)
-            _add_taps(taps, between, turn, cubic, real, imag)
+            _fetch(profiles[pulse], index, fetched)
+            _add_taps(taps, between, turn, real, imag)
         for i in range(count):
             image[start + i] += complex(
                 real[i // _SEGMENT_LENGTH, i % _SEGMENT_LENGTH], imag[i // _SEGMENT_LENGTH, i % _SEGMENT_LENGTH]

@@ -22,7 +22,7 @@ _CACHED_PIXELS_COUNT = 1 << 13  # pixels formed at once; their data fit into a p
 _WORKING_BYTES = {"numpy": 30e6, "cubic": 110e6}  # in addition to data and image: work arrays, and the compiled code
 _SPACIOUS_BYTES = 3 * _WORKING_BYTES["cubic"]
 
-Kernel = Literal["auto", "numpy", "cubic", "linear"]
+Kernel = Literal["auto", "numpy", "cubic"]
 
 
 def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Floats:
@@ -91,10 +91,9 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         Frequencies evenly spaced.
     points : (..., 3) ndarray
         Positions of the pixels. [m]
-    kernel : "auto", "numpy", "cubic" or "linear"
-        "numpy" works for all pixels. "cubic" and "linear" use splines of these orders and are compiled by Numba
-        (extra `fast`); "linear" is faster and accurate to -80 dB. "auto" is "cubic" if Numba is installed, else
-        "numpy".
+    kernel : "auto", "numpy" or "cubic"
+        "numpy" works for all pixels. "cubic" uses a cubic spline and is compiled by Numba (extra `fast`). "auto" is
+        "cubic" if Numba is installed, else "numpy".
 
     Returns
     -------
@@ -106,7 +105,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
     ValueError
         A position that is not finite.
     ImportError
-        `kernel` is "cubic" or "linear" and Numba is not installed.
+        `kernel` is "cubic" and Numba is not installed.
     """
     points = np.asarray(points, dtype=float)
     for name, positions in (("points", points), ("transmitter", history.transmitter), ("receiver", history.receiver)):
@@ -120,7 +119,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: {install_command('fast')}")
     from bisar_budget.simulator.compiled import backproject
 
-    image = backproject(history, points, kernel)
+    image = backproject(history, points)
     return _backprojection(history, points) if image is None else image
 
 

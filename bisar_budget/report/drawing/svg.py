@@ -396,7 +396,7 @@ _SMALL_FONT_RATIO = 0.9  # width of a text in the font of a legend, relative to 
 
 
 def axis_number(value: float) -> str:
-    """Write a number at an axis, with a typographic minus sign."""
+    """Format a number for an axis label, with a typographic minus sign."""
     return f"{value + 0.0:.6g}".replace("-", "−")
 
 
@@ -442,7 +442,7 @@ class Scale(NamedTuple):
 
 
 def short(word: str, room: float) -> str:
-    """Shorten a text to at most `room` px, with an ellipsis at its end."""
+    """Shorten a string to at most `room` px; a shortened string ends with an ellipsis."""
     text = printable(word)
     while text_width(text) > room and len(text) > 2:
         text = f"{text[:-2].rstrip('…')}…"
@@ -459,7 +459,7 @@ def head(canvas: Canvas, lines: Sequence[str]) -> float:
 def x_axis(
     canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = ""
 ) -> float:
-    """Write numbers or words and a label below a frame, and `key` in small below the label.
+    """Write the numbers or words of an axis and its label below a frame, and `key` in small type below the label.
 
     Returns the bottom of the axis. [px]
     """
@@ -487,7 +487,10 @@ def x_axis(
 
 
 def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = "") -> None:
-    """Write numbers or words and a label to the left of a frame, and `key` in small beside the label."""
+    """Write the numbers or words of an axis and its label to the left of a frame.
+
+    `key` is written in small type beside the label.
+    """
     for index, word in enumerate(words):
         canvas.text((frame.left - 6, scale.at(index) + 4), [short(word, frame.left - 34)], "axis", "end")
     for value in () if words else scale.ticks(_NUMBER_ROOM_PX["y"]):
@@ -507,7 +510,7 @@ def outline(canvas: Canvas, frame: Box, style: str) -> None:
 
 
 def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> None:
-    """Draw lines at the ticks of one scale or both."""
+    """Draw grid lines at the ticks of the given scales."""
     if across is not None:
         canvas.lines([frame.upright(across.at(value)) for value in across.ticks(_NUMBER_ROOM_PX["x"])], "grid")
     if up is not None:
@@ -517,7 +520,7 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 class LegendLine(NamedTuple):
     """An entry of a legend: its text, and a function that draws its mark, 25 px wide, to the right of a point.
 
-    `key` is a key of the mission file or an id, which is written in small behind the text.
+    `key` is a key of the mission file or an id, which is written in small type after the text.
     """
 
     words: str
@@ -596,12 +599,15 @@ def tone_of(status: str) -> str:
 
 
 def status_words(status: str) -> str:
-    """Words for a status in a legend."""
+    """Name of a status in a legend."""
     return "no such mission" if has_no_mission(status) else STATUS[status].words
 
 
 def marks_within_colours(statuses: Sequence[str], marks: Sequence[Mark]) -> Mapping[str, Mark]:
-    """Assign a mark to each status. Statuses with the same colour get different `marks`, in their order."""
+    """Assign a mark to each status.
+
+    Statuses with the same colour get successive items of `marks`. If there are too few, the last item is repeated.
+    """
     tones = [tone_of(name) for name in statuses]
     indices = (tones[:index].count(tone) for index, tone in enumerate(tones))
     return {name: marks[min(index, len(marks) - 1)] for name, index in zip(statuses, indices, strict=True)}

@@ -1,6 +1,7 @@
 """Draw the effect of each number of a mission on its worst utilization as a tornado diagram, largest at the top.
 
-All bars are for a change of 1 %: of the number, of a radian, of a power, or of the smaller slant range.
+Each bar shows the effect of a change of 1 %: 1 % of the number itself, of a radian, of a power, or of the smaller
+slant range.
 """
 
 from bisar_budget.design.sensitivity import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
@@ -87,7 +88,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Text of the change in a number whose effect the bar shows."""
+    """Text with the change in a number for which the bar shows the effect, with its unit."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

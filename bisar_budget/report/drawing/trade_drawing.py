@@ -1,4 +1,7 @@
-"""Draw a sweep: utilizations and limit against one key, or a map of statuses or of a column against two keys.
+"""Draw a sweep over one key as curves, or a sweep over two keys as a map.
+
+Curves show the utilizations and their limit, or the values of a column. A map shows the statuses or the values of a
+column.
 
 A report inlines the drawing with the colours of the page. `sweep --plot` writes it to a file with light and dark
 colours. A polar map is a view from above: azimuth from east, counter-clockwise, and the other key as the radius.
@@ -63,13 +66,13 @@ def trade_drawing(
     trade : Trade
         Sweep over one key or two. The first axis of a polar map is the azimuth.
     rows : Mapping[str, ndarray]
-        Utilizations of the rows that are the worst row in some case, (cases,) each, if only one key varies. [-]
+        Utilizations (cases,) of each row that is the worst row in at least one case, if only one key varies. [-]
     key : str
-        Key that makes the ids of the drawing unique.
+        String that makes the ids in the SVG unique.
     title, description : str
         Title of the drawing, and a description for readers who cannot see it.
     above : Sequence[str]
-        Lines above a drawing in a separate file, the name first.
+        Lines above a drawing in a separate file. The first line is the name.
     seen_from_above : BistaticGeometry, optional
         Geometry for a polar map, which shows the direction of the platform that does not vary.
     """
@@ -151,7 +154,7 @@ def _heat_colour(fraction: float) -> str:
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
     """Make the axis scale for the values of a column.
 
-    For utilizations [%] it is logarithmic and includes 10 % and 100 %.
+    The scale for utilizations [%] is logarithmic and includes 10 % and 100 %.
     """
     finite = values[np.isfinite(values)]
     if is_use:
@@ -176,10 +179,10 @@ def _curves(
     word_axis: Axis | None,
     by_word: Mapping[str, Trade],
 ) -> float:
-    """Draw curves against a number: utilizations of rows or words with their limit, or the values of a column.
+    """Draw curves over a key with numbers: utilizations with their limit, or the values of a column.
 
-    `by_word` are the sweeps of the words of `word_axis`. The background has the colour of the status. Returns the
-    bottom of the drawing. [px]
+    There is one curve for each row, or for each word in `by_word`, which has the sweep for each word of `word_axis`.
+    The background has the colour of the status. Returns the bottom of the drawing. [px]
     """
     first = next(iter(by_word.values())) if by_word else trade
     (axis,) = first.axes
@@ -408,7 +411,7 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
-    """Yield the cells of a mask as rectangles. Neighbours along the first axis are merged to one rectangle."""
+    """Yield the cells of a mask as rectangles. Neighbours along the first axis are merged into one rectangle."""
     for j in range(mask.shape[1]):
         padded = np.concatenate([[False], mask[:, j], [False]])
         ends = np.flatnonzero(padded[1:] != padded[:-1])
@@ -420,7 +423,7 @@ def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[fl
 def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
     """Contour line where the utilization is 100 %.
 
-    It is interpolated in the logarithm of the utilization, which is less curved than the utilization.
+    The logarithm of the utilization is interpolated, because it is less curved than the utilization.
     """
     uses = np.asarray(trade.values["utilization"], float)
     # With a row that is not evaluated, the other rows do not determine the distance to the limit.
@@ -436,7 +439,10 @@ def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
 def _heat(
     canvas: svg.Canvas, frame: svg.Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> None:
-    """Draw a column as a heat map with a colour bar. Above two decades the colour scale is logarithmic."""
+    """Draw a column as a heat map with a colour bar.
+
+    The colour scale is logarithmic if the values span more than two decades.
+    """
     column_values = np.asarray(trade.values[trade.column], float)
     column_values = np.where(np.isfinite(column_values), column_values, np.nan)
     finite = column_values[np.isfinite(column_values)]
@@ -464,7 +470,7 @@ def _heat(
 
 
 def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
-    """Write the utilization and the worst row into each cell of a map whose axes both have words."""
+    """Write the utilization and the worst row into each cell of a map with words on both axes."""
     max_characters = int((columns[1] - columns[0]) / 6.5)  # characters of a cell
     for (i, j), use in np.ndenumerate(trade.values["utilization"]):
         if math.isfinite(use):
@@ -480,8 +486,8 @@ def _names(
 ) -> list[svg.LegendLine]:
     """Write the name of the binding row in each region: horizontally, vertically in a tall region, or as a letter.
 
-    The id of the row is written in small below its name. Regions of a polar map have letters. Returns legend entries
-    for the letters and for regions without a name.
+    The id of the row is written in small type below its name. Regions of a polar map have letters. Returns legend
+    entries for the letters and for regions without a name.
     """
     letters: dict[str, str] = {}
     named = set()
@@ -543,7 +549,8 @@ def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
 def _around(canvas: svg.Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[svg.LegendLine]:
     """Draw the grid of a polar map: directions, and circles labelled with the values of the radius.
 
-    If only one platform varies, a mark at the rim shows the direction of the other. Returns its legend entry.
+    If only one platform varies, a mark at the rim shows the direction to the fixed platform. Returns the legend entry
+    of this mark.
     """
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}

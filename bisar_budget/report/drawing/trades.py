@@ -181,17 +181,17 @@ def cell_edges(axis: Axis) -> list[float]:
 
 
 def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield start and stop indices of the stretches of equal neighbours in a sequence of n items.
+    """Yield the start and stop indices of each run of equal consecutive items in a sequence of n items.
 
-    `begins` (n - 1,) is True for each item after the first that begins a new stretch.
+    `begins` (n - 1,) is True for each item after the first that begins a new run.
     """
     return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
 
 
 def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, float]]:
-    """Yield the stretches of an axis in which neighbouring cases have the same status.
+    """Yield the intervals of an axis in which neighbouring cases have the same status.
 
-    Each stretch has its status, first edge and last edge.
+    Each interval is given by its status, first edge and last edge.
     """
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
@@ -201,8 +201,8 @@ def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, flo
 class MapRegion(NamedTuple):
     """A region of neighbouring cells of a map with the same worst row.
 
-    `cell` are the indices of the cell where the name is written. `size` are the numbers of connected cells of the
-    region through this cell along the first and the second axis.
+    `cell` holds the indices of the cell where the name is written. `size` holds the numbers of consecutive cells of
+    the region, counted through this cell along the first and along the second axis.
     """
 
     row: str
@@ -211,7 +211,7 @@ class MapRegion(NamedTuple):
 
 
 def thinned(trade: Trade) -> Trade:
-    """Reduce a sweep over two keys to at most `_MAX_MAP_CELLS` numbers per axis. The first and last ones are kept."""
+    """Thin a sweep over two keys to at most `_MAX_MAP_CELLS` numbers per axis, including the first and the last."""
     picks = [
         np.arange(size)
         if axis.words
@@ -225,7 +225,7 @@ def thinned(trade: Trade) -> Trade:
 def regions(rows: NumbersOrWords) -> list[MapRegion]:
     """Regions of a map that are large enough for a name.
 
-    The name is in the cell farthest from other regions. `rows` (n, m) are the worst rows of the cells.
+    The name is written in the cell farthest from other regions. `rows` (n, m) holds the worst row of each cell.
     """
     seen = rows == ""
     map_regions = []
@@ -296,8 +296,8 @@ def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
 def level_lines(levels: Floats, x: Floats, y: Floats) -> list[tuple[Point, Point]]:
     """Contour lines where a grid of numbers is 0, by linear interpolation between the grid points.
 
-    `levels` is (n, m) at `x` (n,) and `y` (m,). A cell with a corner that is not finite has no line. In a saddle, the
-    mean of the four corners decides which corners are connected.
+    `levels` is (n, m) at `x` (n,) and `y` (m,). A cell with a non-finite corner has no line. In a saddle, the mean of
+    the four corners decides which corners are connected.
     """
     lines: list[tuple[Point, Point]] = []
     is_finite = np.isfinite(levels)

@@ -1,1 +1,1 @@
-"""Explanations of how the status of a row follows: its equations with their numbers, and their typesetting."""
+"""Explanations of the status of a row: equations with their numbers, and their typesetting."""

@@ -25,7 +25,10 @@ from bisar_budget.report.words.sentences import dotted
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
-    """Yield the steps from the line in the file to the value `declared`: stated value, frame and coverage factor."""
+    """Yield the explanation steps that derive the value `declared` from the line in the mission file.
+
+    They show the stated value, its frame and the coverage factor.
+    """
     yield from stated(mission, source.path, source.declared, source.evidence)
     if source.declared is None:
         return
@@ -92,9 +95,9 @@ def _quadratic_form(products: Sequence[str], correlation: Sequence[Sequence[floa
 
 
 def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterator[Step]:
-    """Yield the steps from the value `declared` to the quadratic phase error.
+    """Yield the explanation steps that derive the quadratic phase error from the value `declared`.
 
-    For an undeclared error the steps are for a size of one unit.
+    If the error is not declared, the steps are for an error of one unit.
     """
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
@@ -225,7 +228,7 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
 
 
 def _table_i(kind: SourceKind, axis: str) -> str:
-    """Label of the row of Table I for an error of position, velocity or acceleration along an axis of the scene."""
+    """Label of the row in Table I for a position, velocity or acceleration error along an axis of the scene."""
     assert isinstance(kind, StateKind)
     return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
@@ -305,9 +308,9 @@ def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
 
 
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
-    """Project the quadratic phases along the axes of the scene on the axis of the error, per unit of the error.
+    """Sum the quadratic phases along the axes of the scene, each projected on the axis of the error.
 
-    Returns the sum of the projected phases as text and as a number [rad per unit].
+    Returns the sum as text and as a number, per unit of the error [rad per unit].
     """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
@@ -374,14 +377,17 @@ def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
 
 
 def location(mission: Mission, path: KeyPath) -> str:
-    """Text `file:line:column` of a value, or of its nearest parent key that the file has."""
+    """Location of a value as `file:line:column`. If the file lacks the key, its nearest parent key is located."""
     line = mission.line(path)
     file = printable(mission.file)
     return file if line is None else f"{file}:{line.region.line}:{line.region.column}"
 
 
 def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: str | None) -> Iterator[Step]:
-    """Yield the steps with the line and the evidence of a declared value; one step with the key if it is missing."""
+    """Yield the explanation steps with the line and the evidence of a declared value.
+
+    If the value is missing, there is one step, which names the key.
+    """
     if declared is None:
         yield step(missing(mission, path))
         return
@@ -396,7 +402,7 @@ def missing(mission: Mission, path: KeyPath) -> str:
 
 
 def as_written(mission: Mission, path: KeyPath) -> str:
-    """Text `key: value` of a value, or of its nearest parent key that the file has."""
+    """A value of the mission file as `key: value`. If the file lacks the key, its nearest parent key is given."""
     while path and path not in mission.places:
         path = path[:-1]
     text = getattr(mission.places.get(path), "value", None)
@@ -410,10 +416,10 @@ _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
 
 class Residual:
-    """Range error that remains at the displaced image point of the scene centre, for one error of a signed size.
+    """Range error that remains at the displaced image of the scene centre, for one error with a signed size.
 
-    `image_point` is the displacement east and north [m], None if there is no image. `ranges` are the residual range
-    errors at the nodes of the polynomial fit [m]; the list is empty without an image.
+    `image_point` is the displacement east and north [m], or None if there is no image. `ranges` are the residual
+    range errors at the nodes of the polynomial fit [m]; the list is empty without an image.
     """
 
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
@@ -454,7 +460,7 @@ class Residual:
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
-        """Rms over the aperture of a range error that has `values` at the nodes; both are in metres."""
+        """RMS over the aperture of a range error with the given `values` at the nodes. [m]"""
         return math.sqrt(math.fsum(w * m * m for w, m in zip(self.exact.fit[0].tolist(), values, strict=True)))
 
     @property
@@ -480,8 +486,8 @@ class Residual:
     def hidden(self) -> float:
         """Quadratic phase with the same peak loss as the residual phases that are not quadratic. [rad]
 
-        They are the phase that changes over the band, and the linear phase over the aperture. If `is_turned`, the
-        cubic order and the orders beyond it are included.
+        These are the phase that changes over the band, and the linear phase over the aperture. If `is_turned`, the
+        cubic and higher orders are included.
         """
         square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
@@ -490,10 +496,10 @@ class Residual:
 
     @property
     def judged(self) -> float:
-        """Phase that is compared with the quadratic phase limit. [rad]
+        """Phase that is compared with the limit of the quadratic phase. [rad]
 
-        The limit contains the gain of autofocus. Autofocus does not correct the hidden phase, so the hidden phase is
-        multiplied by this gain before both phases are added by their squares.
+        The limit contains the gain of autofocus, but autofocus does not correct the hidden phase. The hidden phase is
+        therefore multiplied by this gain, and the result is the root-sum-square of both phases.
         """
         return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
@@ -505,9 +511,10 @@ class Residual:
         )
 
     def steps(self, mark: str = "full") -> Iterator[Step]:
-        """Yield the steps from the residual range error to the judged phase, a quadratic phase of equal peak loss.
+        """Yield the explanation steps that derive the judged phase from the residual range error.
 
-        `mark` is appended to the symbols of the phases.
+        The judged phase is a quadratic phase with the same peak loss. `mark` is appended to the symbols of the
+        phases.
         """
         values = {"B": self.radar.bandwidth, "f_0": self.radar.center_frequency}
         b = math.sqrt(float(self.exact.band[0]))
@@ -555,7 +562,7 @@ class Residual:
             yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
-        """Write one line of text for each node of the fit: its time [s] and its item of `values` [m]."""
+        """Write one line of text for each node of the fit: its time [s] and its value in `values` [m]."""
         times = self.exact.times[:, 0].tolist()
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
@@ -580,7 +587,10 @@ class Residual:
 
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
-    """Set to 0 all values that may be only the rounding error of a difference of numbers as large as `full_size`."""
+    """Set to 0 each value that may be only rounding error.
+
+    The values are differences of numbers as large as `full_size`.
+    """
     return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
 
@@ -608,10 +618,10 @@ def worse_sign(
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps from the size of an error, with its sign, to its phases by the full model.
+    """Yield the explanation steps that derive the phases of an error by the full model from its signed size.
 
-    `size` is in the unit of the error. If the error is not declared, its size is one unit. The text `each` then
-    states this, and is inserted into the titles of the steps.
+    `size` is in the unit of the error. It is one unit if the error is not declared. The text `each` then states this,
+    and is inserted into the titles of the steps.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
@@ -677,7 +687,10 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the step with the quadratic phase by the full model, to compare with the judging published model."""
+    """Yield the explanation step with the quadratic phase by the full model.
+
+    It is for comparison with the published model, which decides the status.
+    """
     residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
@@ -714,9 +727,9 @@ def _displacement_of(residual: Residual) -> float:
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
-    """Yield the step with the largest `size` of an error, in `unit`, at which an image still exists.
+    """Yield the explanation step with the largest error, `size` in `unit`, for which an image exists.
 
-    If the error is larger, no ground point has its range history.
+    No ground point has the range history of a larger error.
     """
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
@@ -726,14 +739,14 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
 
 
 def no_limit(row: Row) -> Step:
-    """Return the step that states that a row has no limit, and why."""
+    """Return the explanation step which states that a row has no limit, with the reason."""
     return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
 
 
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
-    """Yield the steps to the allowable of a row, the smallest of the `sizes` that its requirements allow.
+    """Yield the explanation steps for the allowable of a row, which is the smallest of `sizes`.
 
-    The keys of `sizes` are the symbols of the sizes in the explanation, such as `by_QPE`.
+    `sizes` holds the size that each requirement allows. Its keys are symbols in the explanation, such as `by_QPE`.
     """
     if row.allowable is None or not sizes:
         yield no_limit(row)
@@ -762,7 +775,10 @@ RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-squa
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
-    """Yield the steps to the limit on the quadratic phase of `owner`: budget · share · autofocus gain."""
+    """Yield the explanation steps for the quadratic phase limit of `owner`.
+
+    The limit is the product of budget, share and autofocus gain.
+    """
     total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
     owner_words = {
         "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
@@ -775,7 +791,10 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
-    """Yield the steps to the autofocus gain, the factor by which autofocus raises limits on the quadratic phase."""
+    """Yield the explanation steps for the autofocus gain.
+
+    Autofocus raises limits on the quadratic phase by this factor.
+    """
     if allocation.n_pull is None:
         yield step("No autofocus (autofocus.n_pull): gain = 1")
         return
@@ -797,10 +816,9 @@ def combined(
     symbol: str = "combined",
     unit: str = "rad",
 ) -> Iterator[Step]:
-    """Yield the step that combines the sizes of several errors to a total: their maximum, sum or root-sum-square.
+    """Yield the explanation step that combines the sizes of several errors into a total.
 
-    `rule` selects one of the three.
-    If `total` is None, the step only lists the names and sizes.
+    `rule` selects their maximum, sum or root-sum-square. If `total` is None, the step only lists names and sizes.
     """
     title = f"{title}, {RULE_WORDS[rule]}"
     # The remainder of terms that cancel exactly is rounding.

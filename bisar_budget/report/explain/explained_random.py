@@ -120,7 +120,10 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
 
 
 def _inertial(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for an inertial sensor, first without the lever arm of its platform and then with it."""
+    """Yield the explanation steps for an inertial sensor.
+
+    They explain the error first without and then with the lever arm of the platform.
+    """
     yield from _without_lever(analysis, _without_arm(analysis, error))
     yield from _with_arm(analysis, error)
 
@@ -161,7 +164,7 @@ def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
-    """Return the error of an inertial sensor as if its platform had no lever arm."""
+    """Return the error of an inertial sensor for a copy of its platform without a lever arm."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     bare = platform._replace(motion_error=platform.motion_error._replace(lever_arm=None))
@@ -241,9 +244,10 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _by_unit(values: Sequence[float], unit: str) -> list[str]:
-    """Write one line of text for each effect that one unit of an error has, in `unit`.
+    """Write one line of text for each effect of one unit of an error, in `unit`.
 
-    `values` are the quadratic phase, the cubic phase and the residual after the cubic. The last ones may be missing.
+    `values` are the quadratic phase, the cubic phase and the residual after the cubic. The last values may be
+    missing.
     """
     return [
         f"{symbol}/unit = {with_unit(value, unit)}" for symbol, value in zip(_PHASE_SYMBOLS, values, strict=False)
@@ -251,7 +255,10 @@ def _by_unit(values: Sequence[float], unit: str) -> list[str]:
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Yield the step with the effects of one unit by the full model, if the published model gives other effects."""
+    """Yield the explanation step with the effects of one unit of an error by the full model.
+
+    There is no step if the published model gives the same effects.
+    """
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
@@ -286,7 +293,10 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _per_unit(unit: str, error: RandomError) -> str:
-    """Unit of the effect that one unit of an error has, such as `rad per m/s`. For an error in dB it is `unit`."""
+    """Unit of the effect per unit of an error, such as `rad per m/s`.
+
+    For an error in dB it is `unit`, unchanged.
+    """
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
@@ -330,10 +340,10 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _gauss_markov(
     mission: Mission, error: RandomError, correlation_time: float, along: str, title: str
 ) -> Iterator[Step]:
-    """Yield the steps to the mean squares of a Gauss-Markov process, and to its quadratic phase per unit.
+    """Yield the explanation steps for the mean squares of a Gauss-Markov process, and its quadratic phase per unit.
 
-    The phase is that by the published model. `along` is the symbol of the component along the line of sight or, for
-    a delay, along the path through the air. `title` is the title of the last step.
+    The phase is computed by the published model. `along` is the symbol of the component along the line of sight or,
+    for a delay, along the path through the air. `title` is the title of the last step.
     """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
@@ -380,10 +390,11 @@ def _oscillator(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _slow(
     kind: str, frequency: float, remaining: LeftTone, free: float, mission: Mission, unit: str
 ) -> Iterator[Step]:
-    """Yield the step with the quadratic and cubic phase of a tone below one cycle per aperture.
+    """Yield the explanation step with the quadratic and cubic phase of a tone below one cycle per aperture.
 
     If synchronization folds the tone, the step uses its folded frequencies below one cycle per aperture. The squares
-    of these phases are added to those of the noise. `free` is the peak phase without synchronization, in `unit`.
+    of both phases are added to the squares of the noise phases. `free` is the peak phase without synchronization, in
+    `unit`.
     """
     T = mission.collection.aperture_time
     slow = [
@@ -411,7 +422,10 @@ def _pieces_text(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 
 def _power_of_f(exponent: float) -> str:
-    """Text such as `f^2` for a power of f. A negative exponent gets brackets, so that nobody reads a difference."""
+    """Text for a power of f, such as `f^2`.
+
+    A negative exponent is put in brackets, so that its sign is not read as a subtraction.
+    """
     exponent = exponent or 0.0  # white noise has the power −0.0
     return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
@@ -582,7 +596,10 @@ def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _delays(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for a delay in the air: on each leg that it concerns, and for its change over the aperture."""
+    """Yield the explanation steps for an atmospheric delay.
+
+    They give the delay on each leg that it affects, and its change over the aperture.
+    """
     for name in legs_of(error.owner):
         yield from _delay_on_a_leg(analysis, error, name)
     if error.owner not in PLATFORMS:
@@ -591,7 +608,10 @@ def _delays(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
-    """Yield the steps from one unit of zenith delay to the delay on the leg `name` over the aperture."""
+    """Yield the explanation steps that derive the delay on the leg `name` from one unit of zenith delay.
+
+    The delay is given at several times of the aperture.
+    """
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
     (x, y, z), height = plain_vector(path.position), float(height_of(path.position))
@@ -630,7 +650,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
 
 
 def _from_elsewhere(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the step for an error of which the file states only the effect on the image."""
+    """Yield the explanation step for an error that the file states only by its effect on the image."""
     yield effect_from_elsewhere()
 
 
@@ -688,9 +708,9 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
-    """Coverage factor that the declared value of an error contains.
+    """Coverage factor contained in the declared value of an error.
 
-    It is 1 for an error in dB, such as the noise of an oscillator. There the phases contain the factor instead.
+    It is 1 for an error in dB, such as the noise of an oscillator. For such an error the phases contain the factor.
     """
     return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
@@ -749,7 +769,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:
-    """Yield the step that adds the power of the cubic phase to that of the residual phase.
+    """Yield the explanation step that adds the power of the cubic phase to the power of the residual phase.
 
     The step is needed if the mission has no requirement on the cubic phase, so that ISLR limits both.
     """

@@ -1,4 +1,4 @@
-"""Explanation steps of tones, with their echoes and displacements, and of phase noise that spreads power."""
+"""Explanation steps for tones, their echoes and displacements, and for phase noise that spreads power."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,8 +43,8 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
     """Formula for the phase variance [rad²] that a required ISLR allows, and the values of its symbols.
 
-    The formula depends on `model`. `power` is the ISLR as a power ratio. `energy` is the fraction of the energy
-    within the first nulls of the impulse response.
+    The formula depends on `model`. `power` is the required ISLR as a power ratio. `energy` is the fraction of the
+    energy of the impulse response within its first nulls.
     """
     if model == "published":
         return "ISLR", {"ISLR": power}
@@ -52,13 +52,16 @@ def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict
 
 
 def _level(model: str, variance: str) -> str:
-    """Formula for the ISLR [dB] that a phase variance with the symbol `variance` causes according to `model`."""
+    """Formula by `model` for the ISLR [dB] caused by a phase variance; `variance` is the symbol of the variance."""
     ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
     return f"10*log({ratio})/log(10)"
 
 
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps to the ISLR, from the sum of all phase variances that spread power, and to its allowable."""
+    """Yield the explanation steps for the ISLR and its allowable.
+
+    The ISLR follows from the sum of all phase variances that spread power.
+    """
     mission, model, owner = analysis.mission, row.model or "published", row.owner
     members = {each.row_id: each.variance for each in declared_powers(analysis, owner, model)}
     total, energy = math.fsum(members.values()), mainlobe_energy(mission)
@@ -96,9 +99,9 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Yield the steps to the power that tones and the cubic phase spread.
+    """Yield the explanation steps for the power that tones and the cubic phase spread.
 
-    Tones are left out if PSLR is required. The cubic phase is left out if it has a requirement.
+    Tones are left out if PSLR is required. The cubic phase is left out if the mission has a requirement on it.
     """
     powers = [
         Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
@@ -122,7 +125,10 @@ def _tones_and_cubic(
 
 
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """Yield the steps from all tones to their highest joint echo, with the tones at their worst phases."""
+    """Yield the explanation steps for the highest echo that all tones cause together.
+
+    The tones have their worst relative phases.
+    """
     all_tones = tones(mission)
     echo = highest_echo(all_tones)
     if echo is None:
@@ -158,7 +164,10 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
-    """Text with the peak phase of a tone, or with its root-sum-square with `pair_tone`, which is 90 degrees apart."""
+    """Text with the peak phase of a tone, or with the root-sum-square of the peak phases of two tones.
+
+    `pair_tone` is the second tone, 90 degrees out of phase with the first, or None.
+    """
     return number(tone.phase) if pair_tone is None else f"sqrt({number(tone.phase)}^2 + {number(pair_tone.phase)}^2)"
 
 
@@ -177,9 +186,9 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 
 
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
-    """Yield the step to the utilization of a row in decibels, which is a ratio of amplitudes.
+    """Yield the explanation step that computes the utilization of a row in decibels, as a ratio of amplitudes.
 
-    A row without a utilization has no such step.
+    There is no step for a row without a utilization.
     """
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
@@ -189,10 +198,10 @@ def use_of_amplitudes(row: Row) -> Iterator[Step]:
 
 
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
-    """Yield the steps from the orders 0 to 3 of the range error of a tone to the displacement of the image.
+    """Yield the explanation steps that derive the displacement of the image by a tone.
 
-    Each item of `parts` is an axis or a folded frequency and has its own step. `moved` is the total displacement
-    east and north. [m]
+    The displacement follows from the orders 0 to 3 of the range error. Each item of `parts` is an axis or a folded
+    frequency and has its own step. `moved` is the total displacement east and north. [m]
     """
     source = "(25)" if model == "published" else "exact ranges"
     for index, tone_part in enumerate(parts):
@@ -228,7 +237,10 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps from a spur of an oscillator to its paired echoes, and to the level that the share allows."""
+    """Yield the explanation steps for a spur of an oscillator.
+
+    They give the paired echoes of the spur, and the level that the share of the requirement allows.
+    """
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = ("platforms", row.owner, "oscillator", "spurs")
     entry = row.subject.entry or 0
@@ -268,7 +280,10 @@ def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol:
 
 
 def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps from a vibration of an oscillator to its echoes and its allowable sensitivity."""
+    """Yield the explanation steps for a vibration of an oscillator.
+
+    They give its echoes and the allowable acceleration sensitivity.
+    """
     name, entry = row.owner, row.subject.entry or 0
     tone = next(tone for tone in accelerated_tones(mission) if (tone.name, tone.entry) == (name, entry))
     felt_vibration, f_0 = felt(mission, name), mission.radar.center_frequency
@@ -312,9 +327,10 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 
 
 def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
-    """Yield the steps to the largest quadratic and cubic phase of a tone below three cycles per aperture.
+    """Yield the explanation steps for the largest quadratic and cubic phase of a slow tone.
 
-    `free` is the peak phase of the tone without synchronization. [rad]
+    A tone is slow below three cycles per aperture. `free` is the peak phase of the tone without synchronization.
+    [rad]
     """
     T = mission.collection.aperture_time
     near = [
@@ -337,10 +353,10 @@ def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Ste
 def near_phases(
     mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
 ) -> Iterator[Step]:
-    """Yield the steps from the quadratic and cubic phase of a slow tone to the tone size that their limits allow.
+    """Yield the explanation steps for the size of a slow tone that the quadratic and cubic phase limits allow.
 
-    `judged` is the quadratic phase [rad]. A tone of three cycles per aperture or more has no such steps. The size
-    that the limits allow is added to `sizes` under the key `by_phases`.
+    There are no steps for a tone of three cycles per aperture or more. `judged` is the quadratic phase [rad]. The
+    allowed size is added to `sizes` under the key `by_phases`.
     """
     limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
     if not judged and not row.cubic_rad:
@@ -362,16 +378,19 @@ def near_phases(
 
 
 def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
-    """Return the step to the allowable of a tone, the smallest of `sizes`.
+    """Return the explanation step for the allowable of a tone, which is the smallest of `sizes`.
 
-    The keys of `sizes` are symbols of the explanation, such as `by_echoes`.
+    The keys of `sizes` are symbols in the explanation, such as `by_echoes`.
     """
     formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
     return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the steps from the ISLR stated for an error to the rms phase that spreads as much, and to its limit."""
+    """Yield the explanation steps for an error that is stated by its ISLR.
+
+    They give the RMS phase error that causes the same ISLR, and the limit of this phase.
+    """
     index, model = row.subject.entry or 0, row.model or "full"
     power = next(each for each in stated_powers(mission) if each.subject == row.subject)
     yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
@@ -393,5 +412,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """Return the step which says that the file states an error by its effect on the image, whatever the cause."""
+    """Return the step which states that an error is declared by its effect on the image, whatever its cause."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

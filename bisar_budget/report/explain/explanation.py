@@ -1,4 +1,4 @@
-"""Explain a row or a requirement: its line in the mission file, the equations with numbers, and the verdict."""
+"""Explain a row or a requirement: its line in the mission file, the equations with numbers, and the status."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -91,7 +91,10 @@ def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
 
 
 def explain_requirement(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> str:
-    """Explain a requirement of a mission as text: its status, its line in the file, and the rows that judge it."""
+    """Explain a requirement of a mission as text.
+
+    The text gives its status, its line in the file, and the rows that determine the status.
+    """
     title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}{printable(own_id(requirement))}"
     return _text(
         mission,
@@ -119,7 +122,8 @@ def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
 def _fitted(line: str) -> list[str]:
     """Wrap a line of an explanation at spaces.
 
-    Continued lines are indented more. No line ends between `=` and the next word, or between a number and its unit.
+    Continuation lines are indented further. No line is broken between `=` and the next word, or between a number and
+    its unit.
     """
     start = len(line) - len(line.lstrip())
     if not start:
@@ -132,7 +136,10 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps from the line of a row in the file to its utilization, or to the reason why it has none."""
+    """Yield the steps of the explanation of a row.
+
+    They lead from the line in the mission file to the utilization, or to the reason why the row has no utilization.
+    """
     yield from _to_utilization(mission, findings, row)
     yield from not_judged(findings, row)
 
@@ -164,9 +171,9 @@ def _model(row: Row) -> str:
 
 
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
-    """Yield the steps to the quantities of a mission that depend on the geometry only.
+    """Yield the explanation steps for the quantities of a mission that depend only on the geometry.
 
-    They are the look direction (11), the smear direction (31) and det Q, the determinant of the matrix in (30).
+    These are the look direction (11), the smear direction (31) and det Q, the determinant of the matrix in (30).
     """
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
@@ -187,7 +194,10 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
 
 
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
-    """Yield the steps from the requirements to the allowable of an error, which is the smallest size they allow."""
+    """Yield the explanation steps for the allowable of an error.
+
+    The allowable is the smallest of the sizes that the requirements allow.
+    """
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_allowed(source.owner)
     yield from limit_steps(allocation, source.owner, limit)
@@ -236,9 +246,10 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 
 
 def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps that explain a vibration, with the results in the unit of the file.
+    """Yield the explanation steps for a vibration, with the results in the unit of the file.
 
-    If the file states a spectral line as an acceleration, the steps are in metres and convert the results back.
+    If the file states a spectral line as an acceleration, the steps are in metres, and the results are converted
+    back.
     """
     mission, allocation, tone = analysis.mission, findings.allocation, analysis.slow_tones.get(row.id)
     lines = lines_of(mission, row.owner)
@@ -257,9 +268,9 @@ def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: R
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """Yield the steps of a vibration from its line in the file to its limits by both models.
+    """Yield the explanation steps for a vibration: its line in the file, and its limits by both models.
 
-    The vibration is one spectral line, the sum of several lines near each other, or noise.
+    The vibration is a single spectral line, the sum of several neighbouring lines, or noise.
     """
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
@@ -355,7 +366,7 @@ def _limit(
 ) -> Iterator[WorkedEquation]:
     """Yield the equations for the largest vibration amplitude [m] that a model allows.
 
-    If `is_power` is true, the formula gives an rms value, and a second equation multiplies it by √2.
+    If `is_power` is true, the formula gives an RMS value, and a second equation multiplies it by √2.
     """
     if not is_power:
         yield WorkedEquation(model, formula, values, result, "m")
@@ -366,7 +377,10 @@ def _limit(
 
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone) -> Iterator[Step]:
-    """Yield the steps from the phases of a vibration below one cycle per aperture to its allowable amplitude."""
+    """Yield the explanation steps for a vibration below one cycle per aperture.
+
+    They derive the allowable amplitude from the phases of the vibration.
+    """
     axes, gain = tone.declared.axes(), allocation.autofocus_gain
     yield step("By either model", _of_axes("QPE", [phase.quadratic for phase in axes]))
     yield step("Cubic phase likewise", _of_axes("cubic", [phase.cubic for phase in axes]))
@@ -401,7 +415,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Equation that adds the `phases` [rad] of all axes of a vibration; `symbol` stands for the sum."""
+    """Equation that adds the `phases` [rad] of all axes of a vibration; `symbol` is the symbol of the sum."""
     numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
@@ -420,9 +434,9 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """Yield the step that projects a vibration on the line of sight.
+    """Yield the explanation step that projects a vibration on the line of sight.
 
-    With a direct path, the step gives the effect of the vibration on the range minus the direct path instead.
+    For a receiver with a direct path, the step instead gives the effect on the range minus the direct path.
     """
     vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
@@ -450,7 +464,10 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    """Yield the step that adds the echoes of neighbouring spectral lines at the point where their sum is highest."""
+    """Yield the explanation step that adds the echoes of neighbouring spectral lines.
+
+    They are added at the point where their sum is highest.
+    """
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
     near = [lines[member] for member in members]
@@ -487,7 +504,10 @@ def _islr(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[S
 
 
 def _specification(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps of a specification: its line in the file, and the largest declared error to compare with it."""
+    """Yield the explanation steps for a specification.
+
+    They give its line in the file, and the largest declared error, which is compared with it.
+    """
     mission = analysis.mission
     key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
     path = ("specifications", key)
@@ -501,7 +521,10 @@ def _declarations(analysis: Analysis, findings: MissionFindings, row: Row) -> It
 
 
 def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the sum of the quadratic phases and to its limit, the pull-in range of autofocus."""
+    """Yield the explanation steps for the sum of the quadratic phases and for its limit.
+
+    The limit is the pull-in range of autofocus.
+    """
     together, allocation = analysis.together(_model(row)), findings.allocation
     sizes_by_name = together.phase_parts(quadratics(together.owed(allocation.qpe, row.owner)), "sum")
     yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
@@ -511,7 +534,7 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the combined quadratic phase of all errors of the row's owner, and to its limit."""
+    """Yield the explanation steps for the combined quadratic phase of all errors of the row's owner, and its limit."""
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
     rule, gain = findings.combine, allocation.autofocus_gain
@@ -549,7 +572,10 @@ def _cubic_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) ->
 
 
 def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the quadratic phase over the band by ionospheric dispersion, for each leg and for both."""
+    """Yield the explanation steps for the quadratic phase over the band that ionospheric dispersion causes.
+
+    It is given for each leg and for both legs together.
+    """
     mission = analysis.mission
     legs = dispersed_legs(mission, mission.geometry)
     for name, phase in legs.items():
@@ -618,7 +644,10 @@ def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row)
 
 
 def _unstated(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield no step: the file does not state how the log is processed, so that its residual is not explained."""
+    """Yield no steps.
+
+    The file does not state how the log is processed, so its residual cannot be explained.
+    """
     yield from ()
 
 
@@ -655,7 +684,10 @@ _EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "t
 
 
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
-    """Yield the steps with the line of a requirement in the file and with the rows that judge it."""
+    """Yield the explanation steps for a requirement.
+
+    They give its line in the file and the rows that determine its status.
+    """
     path = ("requirements", requirement.key)
     if requirement.key == DECLARE:
         yield from _asked_for(mission)
@@ -674,7 +706,10 @@ def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedR
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """Yield the steps with the errors that the file must declare and with those of them that it does not declare."""
+    """Yield the explanation steps with the errors that the file must declare.
+
+    A second step lists the errors among them that are missing in the file.
+    """
     yield from _asked_for(mission)
     missing_keys = [declaration.lacks or declaration.key for declaration in missing_declarations(mission)]
     yield step("Not in the file", *(missing_keys or ["nothing: all of it is declared"]))
@@ -710,9 +745,9 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 
 
 def _air_that_changes(reason: Note) -> Step:
-    """Return the step for air delays that are declared constant.
+    """Return the explanation step for atmospheric delays that are declared constant.
 
-    It gives the effect that the delays would have if they changed. It also gives this effect as a fraction of the
+    It gives the effect that the delays would have if they changed over time, and this effect as a fraction of the
     allowable.
     """
     values: Sequence[SectionValue] = reason.values
@@ -725,7 +760,10 @@ def _air_that_changes(reason: Note) -> Step:
 
 
 def _reason(findings: MissionFindings, row: Row) -> Note | None:
-    """Reason why a row, or the requirement with the id of the row, is not judged or is waived; None without one."""
+    """Reason why a row is not judged or is waived; None if there is no such reason.
+
+    For an undeclared row, it is the reason for the requirement with the same id.
+    """
     if row.status in ("not_evaluated", "waived"):
         return row.reason
     if row.status == "not_declared":
@@ -736,9 +774,9 @@ def _reason(findings: MissionFindings, row: Row) -> Note | None:
 
 
 def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[Step]:
-    """Yield the steps for an effect that no requirement judges.
+    """Yield the explanation steps for an effect that is not limited by any requirement.
 
-    They give the total size of the effect, the size below which it is negligible, and the row's contribution.
+    They give the total size of the effect, the size below which it is negligible, and the contribution of the row.
     """
     effect_name = untaken.effect
     totals = []
@@ -772,7 +810,10 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 
 
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
-    """Yield the steps for a platform path that may be wrong: its possible error and the declared position errors."""
+    """Yield the explanation steps for a platform path that may be wrong.
+
+    They give the possible error of the path and the declared position errors.
+    """
     for doubt in input_doubts(mission):
         if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.state):
             continue
@@ -799,7 +840,10 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _of_log(doubt: InputDoubt) -> Step:
-    """Return the step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
+    """Return the explanation step for a doubtful flight log.
+
+    It gives the residual of the log or the resolution of its fixes, and the largest negligible value.
+    """
     if doubt.is_phase:
         title = f"Residual of the {doubt.owner}’s smoothed log along the line of sight, rms phase"
         return step(title, f"left = {with_unit(doubt.doubt, 'rad')}", f"most = {with_unit(doubt.declared, 'rad')}")
@@ -809,7 +853,10 @@ def _of_log(doubt: InputDoubt) -> Step:
 
 
 def _stated_by_source(doubt: InputDoubt) -> Step:
-    """Return the step that compares the error stated by the source of a path with the declared error."""
+    """Return the explanation step that compares two errors of a path.
+
+    They are the error stated by the source of the path and the declared error.
+    """
     title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
     sizes = {"stated": doubt.doubt, "declared": doubt.declared}
     return step(title, *(f"{name} = {with_unit(size, doubt.unit)}" for name, size in sizes.items()))

@@ -48,7 +48,7 @@ class Node(NamedTuple):
 class Language(NamedTuple):
     """Templates for writing formulas in an output language, with `%s` for each child of an operation.
 
-    `catalogue_index` is the index of this language in the entries of the catalogue.
+    `catalogue_index` is the index of the language in each entry of the catalogue.
     """
 
     catalogue_index: int
@@ -106,7 +106,10 @@ LATEX = Language(
 
 @lru_cache(maxsize=256)
 def is_mathematical(formula: str) -> bool:
-    """Whether all symbols of a formula are letters. Formulas with words, such as budget times share, stay text."""
+    """Whether all symbols of a formula are letters.
+
+    Formulas with words, such as budget times share, are not typeset.
+    """
     try:
         parsed(formula)
     except ValueError:
@@ -117,12 +120,12 @@ def is_mathematical(formula: str) -> bool:
 
 @lru_cache(maxsize=256)
 def parsed(formula: str) -> Node:
-    """Parse the text of a formula to a tree of nodes.
+    """Parse the text of a formula into a tree of nodes.
 
     Raises
     ------
     ValueError
-        The text is no formula in this notation.
+        The text is not a formula in this notation.
     """
     tokens = [match[1] for match in _FORMULA_TOKEN.finditer(formula)]
     if "".join(tokens).replace(" ", "") != formula.replace(" ", ""):
@@ -134,12 +137,12 @@ def parsed(formula: str) -> Node:
 
 
 def formula_text(formula: str, language: Language, numbers: Mapping[str, str] | None = None) -> str:
-    """Write a formula in an output language, with the texts in `numbers` in place of the symbols.
+    """Write a formula in an output language, with its symbols replaced by the strings in `numbers`.
 
     Raises
     ------
     ValueError
-        The text is no formula in this notation.
+        The text is not a formula in this notation.
     """
 
     def write(node: Node) -> str:
@@ -270,18 +273,24 @@ def motion_symbol(state: str, axis: str, platform: str) -> str:
 
 
 def motion_coefficients(state: str, axis: str, platform: str) -> dict[int, str]:
-    """Formulas in Table I for the coefficients of one motion error; the keys are the powers of slow time."""
+    """Formulas in Table I for the coefficients of a motion error.
+
+    The keys of the result are the powers of slow time.
+    """
     names = {order: f"Table I {motion_symbol(state, axis, platform)} {order}" for order in range(4)}
     return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
 
 def motion_phase(state: str, axis: str, platform: str) -> str | None:
-    """Formula in Table II for one motion error; None for a position error, which has no quadratic phase."""
+    """Formula in Table II for a motion error; None for a position error, which has no quadratic phase."""
     return TEXTS.get(f"Table II {motion_symbol(state, axis, platform)} 0")
 
 
 def clock_coefficient(order: int) -> str:
-    """Formula in the first row of Table I: coefficient of a clock error at the power `order` of slow time."""
+    """Formula in the first row of Table I for a coefficient of a clock error.
+
+    `order` is the power of slow time.
+    """
     return TEXTS[f"Table I t̃ {order}"]
 
 
@@ -294,12 +303,15 @@ def inertial_phases(symbol: str) -> tuple[str, ...]:
 
 
 def amplitude_share(platform: str) -> str:
-    """Formula for the part that one platform contributes to the echo amplitude of both platforms."""
+    """Formula for the contribution of a platform to the echo amplitude that both platforms cause together."""
     return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
-    """A formula as text, with the values of its symbols and its result; empty if the result is a given number."""
+    """A formula as text, with the values of its symbols and its result.
+
+    If the result is a given number, the formula is empty.
+    """
 
     symbol: str
     formula: str
@@ -311,7 +323,7 @@ class WorkedEquation(NamedTuple):
     def lines(self) -> tuple[str, ...]:
         """Two lines with aligned equals signs: the formula with symbols, and the formula with numbers and result.
 
-        A given number has one line.
+        A given number is written on a single line.
         """
         if not self.formula:
             return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
@@ -365,7 +377,7 @@ def six_digits(value: float) -> str:
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Write a number with six digits and its unit; a ratio (unit `1`) has none."""
+    """Write a number with six digits and its unit. A ratio (unit `1`) is written without a unit."""
     return f"{six_digits(value)} {'' if unit == '1' else unit.replace('^2', '²')}".rstrip()
 
 
@@ -380,7 +392,10 @@ class Typeset(NamedTuple):
 
 
 def is_formula(equation: WorkedEquation) -> bool:
-    """Whether an equation is typeset as a formula: it is one of the derivation, or its symbols are letters."""
+    """Whether an equation is typeset as a formula.
+
+    It is typeset if it belongs to the derivation, or if all its symbols are letters.
+    """
     return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
 
 
@@ -396,7 +411,10 @@ def readable(text: str) -> str:
 
 
 def as_mathml(equation: WorkedEquation) -> Typeset:
-    """Write an equation as MathML in up to three `math` elements, so that a narrow page can break between them."""
+    """Write an equation as MathML.
+
+    It has up to three `math` elements, so that lines on a narrow page can break between them.
+    """
     unit = ""
     if equation.unit:
         unit = f'<mspace width="0.25em"/><mtext>{xml_text(equation.unit.replace("^2", "²"))}</mtext>'
@@ -444,7 +462,7 @@ def catalogued(formula: str, language: Language) -> str:
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
     """Replace the symbols in a MathML formula by their values.
 
-    A negative number gets brackets. A number with a power of ten gets them where the formula raises it to a power.
+    A negative number is put in brackets, and so is a number with a power of ten if the formula raises it to a power.
     """
 
     def filled_match(match: re.Match[str]) -> str:
@@ -478,7 +496,10 @@ def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
 
 
 def _number_in(language: Language, value: float) -> str:
-    """Write a number with six digits in an output language; a very large or small one gets a power of ten."""
+    """Write a number with six digits in an output language.
+
+    A very large or small number is written with a power of ten.
+    """
     digits, _, exponent = six_digits(abs(value)).partition("e")
     number = language.number % digits
     if exponent:

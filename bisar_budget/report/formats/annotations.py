@@ -1,8 +1,8 @@
 """Annotate mission files with the findings that need attention: as GitHub workflow commands and as SARIF 2.1.0.
 
-Each finding points to a value in the mission file. Rows that pass, judge nothing or are not declared are left out. A
-requirement is a finding if it is broken or waived and none of its rows has this status. Overrides from outside a
-mission file are a finding as well.
+Each finding points to a value in the mission file. Rows are left out if they pass, have no requirement to check or
+are not declared. A requirement is a finding if it is broken or waived and its rows do not show this status. Overrides
+from outside a mission file are a finding as well.
 """
 
 import json
@@ -55,7 +55,7 @@ class _Annotation(NamedTuple):
 def as_github(report: Report, style: Style) -> str:
     """Write one GitHub workflow command for each finding, worst first.
 
-    Without findings, write one line that is not a command.
+    If there are no findings, a line that is not a command is written.
 
     The runner shows at most ten errors and ten warnings per step.
     """
@@ -88,7 +88,7 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
 
 
 def _finding(row: Row, mission: MissionFindings) -> str:
-    """Sentence about a row, with the ids of the requirements that the row shows."""
+    """Sentence about a row, with the ids of the broken or waived requirements that the row represents."""
     ids = shown_ids(row, mission)
     return sentences(finding(row, mission), f"Requirement: {', '.join(ids)}" if ids else "")
 
@@ -340,7 +340,10 @@ def _requirement(
 
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
-    """SARIF properties of a finding and its mission. Missing values are left out, and texts are made printable."""
+    """SARIF properties of a finding and its mission.
+
+    Missing values are left out, and unprintable characters in strings are made printable.
+    """
     values = {
         "mission": mission.name,
         "confidence": mission.confidence,
@@ -395,9 +398,9 @@ def _sarif_region(line: int | None) -> dict[str, int]:
 def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: _Object) -> _Object:
     """Make the SARIF suppression of a waived finding from the first waiver that has not expired.
 
-    It is empty if the status is not `waived`.
+    The result is empty if the status is not `waived`.
 
-    The waiver is written in the checked file, which the standard calls `inSource`.
+    The kind of the suppression is `inSource`, because the waiver is written in the checked file.
     """
     if status != "waived" or not waivers:
         return {}

@@ -1,9 +1,9 @@
 """Write requirements and rows as CSV for a spreadsheet: a header, then a line in SI units for each of them.
 
-The column `kind` says whether a line is a requirement or a row. The line of a requirement has an id such as
+The column `kind` states whether a line is a requirement or a row. The line of a requirement has an id such as
 `requirement.islr`, the reached value in the column `declared`, the required value in `allowable`, and the deciding
-row in `decided_by`. If a share of the requirement decides, the utilization is that of the share, whose values are in
-the columns `share_allowed` and `share_reached`.
+row in `decided_by`. If a share of the requirement decides, the utilization is the utilization of this share, and the
+columns `share_allowed` and `share_reached` have its values.
 """
 
 import csv

@@ -28,7 +28,7 @@ CHECK_FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the JSON item of one mission, each row on its own line. A number that is not finite raises an error."""
+    """Write the JSON item of one mission, with each row on its own line. A non-finite number raises an error."""
     item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
     return _indented(item, _INDENTED_LEVELS, _MARGIN)
 
@@ -55,7 +55,7 @@ def _encoder(separator: str) -> Callable[[object], str]:
 def _indented(value: object, levels: int, margin: str = "") -> str:
     """Write a value as JSON in which only the outermost `levels` levels of nesting are indented.
 
-    `json.dumps` with an indentation would run in pure Python and take as long as the check itself.
+    With an indentation, `json.dumps` would run in pure Python and take as long as the check itself.
     """
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
         return _encoder(", ")(value)
@@ -79,12 +79,12 @@ def _indented(value: object, levels: int, margin: str = "") -> str:
 
 
 def document_text(form: str, content: Mapping[str, object]) -> str:
-    """Write a JSON document in the documented format `form`. A number that is not finite raises an error."""
+    """Write a JSON document in the documented format `form`. A non-finite number raises an error."""
     return json.dumps({"format": form, "version": __version__, **content}, indent=2, allow_nan=False) + "\n"
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
-    """JSON item about changes and overrides from outside the mission file. All JSON documents share its form."""
+    """JSON item about changes and overrides from outside the mission file, the same in all JSON documents."""
     return {
         "set": [change._asdict() for change in mission.changes],
         "overrides": [override._asdict() for override in mission.overrides],
@@ -202,7 +202,7 @@ def _warning(warning: FileWarning) -> dict[str, object]:
 
 
 def verdict_item(verdict: Verdict) -> dict[str, object]:
-    """JSON item about the verdict that the images formed at a limit give, with the codes of its reasons."""
+    """JSON item about a verdict from images formed with an error at its limit, with the codes of its reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
@@ -270,7 +270,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, object]:
 def _stated_accuracy(stated: StatedAccuracy) -> dict[str, object]:
     """JSON item about the accuracy that the source of a path states, as standard deviations.
 
-    There is one for each axis of the scene, or one total without a direction.
+    There is a value for each axis of the scene, or a single total without a direction.
     """
     variances = [row[index] for index, row in enumerate(stated.covariance or ())]
     sigmas = [math.sqrt(max(variance, 0.0)) for variance in variances]

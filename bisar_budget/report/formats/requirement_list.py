@@ -1,7 +1,8 @@
-"""Write the requirements of missions as CSV with their status, in the columns of a requirements file and more.
+"""Write the requirements of missions with their status as CSV.
 
-A line has a requirement id of the project, with the requirement or row that has it; a requirement without such an id
-has one line. A mission reads the file with `requirements: {file: …}` and ignores the columns behind `limit`.
+The columns are the columns of a requirements file, followed by further columns. A line has a requirement id of the
+project and the requirement or row to which it is assigned. A requirement without such an id has a line of its own. A
+mission reads the file with `requirements: {file: …}` and ignores the columns after `limit`.
 """
 
 import math
@@ -59,7 +60,7 @@ def _or_empty(cell: str) -> str:
 
 
 def limit_of_file(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Limit of a requirement as the file writes it, or with all digits if the file does not state it."""
+    """Limit of a requirement as written in the file, or with all digits if the file does not state it."""
     if requirement.key == DECLARE or requirement.value is None:
         return ", ".join(mission.kinds.required)
     if isinstance(requirement.line, Place) and not requirement.is_default and requirement.line.text:

@@ -82,7 +82,7 @@ _UidName = tuple[str, ...]  # an id of the project, or the name of a finding as 
 
 @dataclass
 class _Required:
-    """A requirement of the document, which several missions, requirements and rows may have in common."""
+    """A requirement of the document; several missions, requirements and rows may share it."""
 
     titles: list[str] = field(default_factory=list)
     statements: list[str] = field(default_factory=list)
@@ -91,7 +91,7 @@ class _Required:
     limits: list[str] = field(default_factory=list)
 
     def node(self, uid: str) -> StrictNode:
-        """Node of the requirement with the given UID; its status is the worst."""
+        """Node of the requirement with the given UID. Its status is the worst of all its statuses."""
         fields = {"UID": uid, "STATUS": worst(self.statuses), "TITLE": _unique(self.titles)}
         texts = {"STATEMENT": _unique(self.statements, " "), "KEY": _unique(self.keys), "LIMIT": _unique(self.limits)}
         return StrictNode(fields | texts)
@@ -99,7 +99,7 @@ class _Required:
 
 @dataclass
 class _Result:
-    """Result of a check, and the names of the requirements above it."""
+    """Result of a check, and the names of its parent requirements."""
 
     status: str
     title: str
@@ -109,15 +109,15 @@ class _Result:
 
 
 def _unique(texts: Sequence[str], separator: str = "; ") -> str:
-    """Join different texts."""
+    """Join the distinct non-empty strings."""
     return separator.join(dict.fromkeys(filter(None, texts)))
 
 
 def as_sdoc(report: Report, style: Style) -> str:
     """Write the requirements of missions, each with the results that decide its status as nodes below it.
 
-    A requirement has the ids that the project gives to it, or else an id as in `needs.json`. An id that several
-    requirements, rows or missions have is one node with the worst status. A result is the row that decides a
+    A requirement has the ids that the project gives it, or else an id as in `needs.json`. If several requirements,
+    rows or missions share an id, they have a common node with the worst status. A result is the row that decides a
     requirement, a row with an id of the project, or a requirement that no row decides. A mission file that cannot be
     used is a result without a requirement.
     """
@@ -149,7 +149,10 @@ def _add_requirements(
     required: dict[_UidName, _Required],
     results: dict[_UidName, _Result],
 ) -> None:
-    """Add the requirements of a mission, and the row that decides each of them, or its own result without a row."""
+    """Add the requirements of a mission, each with the row that decides it.
+
+    If there is no such row, the requirement is added with a result of its own.
+    """
     rows = {row.id: row for row in mission.rows}
     for requirement in mission.requirements:
         name = identity.of(requirement_id(requirement))
@@ -177,7 +180,7 @@ def _add_rows(
     required: dict[_UidName, _Required],
     results: dict[_UidName, _Result],
 ) -> None:
-    """Add the requirement ids that a mission gives to rows, with the results of these rows."""
+    """Add the requirement ids that a mission assigns to rows, with the results of these rows."""
     for row in mission.rows:
         for own_id in row.requirement_ids:
             node = required.setdefault((own_id,), _Required())
@@ -189,7 +192,7 @@ def _add_rows(
 
 
 def _result_of(row: Row, mission: MissionFindings, identity: Identity, results: dict[_UidName, _Result]) -> _Result:
-    """Result of a row, which is added if it is not among the results yet."""
+    """Result of a row. It is added to `results` if it is missing there."""
     texts = (f"{row.id} of {mission.name}", finding(row, mission), _origin_words(row.line, mission, identity))
     return results.setdefault(identity.of(row.id), _Result(row.status, *texts))
 
@@ -199,12 +202,12 @@ def _origin_words(line: int | None, mission: MissionFindings, identity: Identity
 
 
 def _text_of(name: _UidName, mission: MissionFindings) -> str:
-    """Text that the mission states for an id of the project; empty for the name of a finding."""
+    """Text of the mission for a requirement id of the project; empty if `name` is the name of a finding."""
     return mission.requirement_texts.get(name[0], "") if len(name) == 1 else ""
 
 
 def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Write a requirement without a text of its own as a sentence."""
+    """Write a sentence for a requirement that has no text of its own."""
     limit = limit_of_file(requirement, mission)
     if requirement.key == DECLARE:
         return f"The mission file shall declare the errors {limit}."
@@ -212,7 +215,7 @@ def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
 
 
 def _row_sentence(row: Row, mission: MissionFindings) -> str:
-    """Write a row without a text of its own as a requirement in one sentence."""
+    """Write a requirement sentence for a row that has no text of its own."""
     if row.allowable is None:
         return f"{row.id} shall comply with the budget."
     return f"{row.id} shall be at most {row_limit(row, mission)}."

@@ -59,7 +59,7 @@ def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write the reports of all missions, with their overall status below several missions."""
+    """Write the reports of all missions, followed by the overall status if there are several missions."""
     text = ("\n" if style.verbosity < 0 else "\n\n").join(piece.text for piece in pieces)
     if len(pieces) > 1:
         text += "\n\n" + _overall([piece.status for piece in pieces], style)
@@ -142,7 +142,7 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
-    """Yield the lines for one requirement in the table, with its ids and texts in the project below it.
+    """Yield the lines for a requirement in the table, followed by its ids and texts in the project.
 
     A long id of the deciding row is put on the next line.
     """
@@ -162,10 +162,10 @@ def _requirement_values(line: RequirementLine, widths: Sequence[int], style: Sty
 
 
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
-    """Yield the name and text of each line about the collection geometry; with -v also how many rows have which
-    status.
+    """Yield the name and text of each line about the collection geometry.
 
-    The line about the model is left out, because the model is written after the name of the mission.
+    With -v, a further line gives the number of rows of each status. The line about the model is left out, because the
+    model is written after the name of the mission.
     """
     yield from ((key, text) for key, text in head(mission) if key != "Model")
     if style.verbosity > 0:
@@ -190,7 +190,7 @@ _TABLE_HEADER = (f"{'status':<{_STATUS_WIDTH}} row", "declared", "allowable", "u
 def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
     """Yield the table of rows that are declared or limit something, worst first, and the numbers of hidden rows.
 
-    To fit `room` lines, passing rows are hidden, beginning with the row that has the smallest utilization.
+    If the table has more than `room` lines, passing rows are hidden, beginning with the smallest utilization.
     """
     rows, hidden = worst_first(mission.rows), list[Row]()
     # A mission without declared errors shows all rows: the allowables are the answer.
@@ -227,7 +227,7 @@ def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) ->
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
-    """Text below the table of rows: an explanation of its columns, and how many rows are hidden."""
+    """Text below the table of rows: an explanation of its columns, and the number of hidden rows."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: requirement that sets the allowable, or for QPE its table, equation or model"
@@ -251,8 +251,8 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 def _limited_by(row: Row) -> str:
     """Text about the limit of a row for a table column.
 
-    It is the name of the requirement that sets the allowable. If this is the metric in which the row itself is
-    stated, it is the equation of the limit.
+    It names the requirement that sets the allowable, or the equation of the limit if this requirement is on the
+    metric in which the row itself is stated.
     """
     binding = binding_words(row)
     if binding:

@@ -24,9 +24,9 @@ def as_junit(report: Report, style: Style) -> str:
     """Write a test suite for each mission, with a test case for each requirement and row.
 
     The report is for GitLab, Jenkins and requirements tools. The schema is Jenkins' junit-10, with properties of test
-    cases as pytest writes them. A broken requirement is a failure, a row that judges nothing is skipped, and an
-    unusable file is an error. A warning passes, with a remark in its output. All times are 0, so that equal runs give
-    equal reports.
+    cases as pytest writes them. A broken requirement is a failure, a row that checks no requirement is skipped, and
+    an unusable file is an error. A test case with a warning passes, with a remark in its output. All times are 0, so
+    that identical runs give identical reports.
 
     To keep the file small (a fleet may have 10⁵ rows), lines are not indented, and a row without a verdict has only
     its values as properties.
@@ -157,7 +157,10 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """Yield the XML element with the outcome of a test case: failure, skip or remark; no element for a plain pass."""
+    """Yield the XML element with the outcome of a test case: failure, skip or remark.
+
+    There is no element for a test case that passes without a remark.
+    """
     status = STATUS[status_name]
     if status.junit == "failure":
         location = f"{file}:{line}: " if line is not None else ""
@@ -231,12 +234,15 @@ def needs_document(version: str, prefix: str, named_needs: Sequence[_NamedNeed])
 
 
 def identifier(prefix: str, name: tuple[str, ...]) -> str:
-    """Make an id from a name that matches the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
+    """Make an id from a name. The id matches the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
     return "_".join([prefix, *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
 
 
 def _unused(identifier: str, needs: Container[str]) -> str:
-    """Make an identifier unique by a number, from 2 on, if it is already in `needs`. A file may occur twice."""
+    """Make an identifier unique.
+
+    If `needs` already contains it, for example because a file occurs twice, a number is appended, starting with 2.
+    """
     unique, number = identifier, 2
     while unique in needs:
         unique, number = f"{identifier}_{number}", number + 1
@@ -277,7 +283,7 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, links: Sequ
 
 
 def origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
-    """Yield texts on where a value comes from: file and line, then changes and overrides from outside the file."""
+    """Yield texts about the origin of a value: file and line, then changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"

@@ -6,7 +6,10 @@ from bisar_budget.report.formats.csv_table import csv_text
 
 
 def csv_of(records: Records) -> str:
-    """Write a header, then the lines of a table. A missing value is an empty cell; lists are joined by blanks."""
+    """Write the header and the lines of a table as CSV.
+
+    A missing value is an empty cell. The items of a list are separated by blanks.
+    """
     return csv_text(
         [records.columns, *([_cell(line.get(name)) for name in records.columns] for line in records.lines)]
     )

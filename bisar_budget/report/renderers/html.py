@@ -175,7 +175,7 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
-    """Write a table cell or an entry of a list of facts as an element, which gets the style class of its text."""
+    """Write a table cell, or an entry of a list of facts, as an element with the style class of its text."""
     if isinstance(text, doc.Styled):
         style, text = text.style, text.text
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
@@ -223,7 +223,7 @@ def _stack(stack: doc.Stack) -> Markup:
 def _inline(figure: doc.Figure) -> Markup:
     """Write the SVG of a drawing into the page.
 
-    The anchor is put before the ids of the drawing, because a report may contain a mission twice.
+    The ids in the drawing are prefixed with its anchor, because a report may contain a mission twice.
     """
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
@@ -234,7 +234,7 @@ def _step(title: str, equations: Iterable[WorkedEquation | str | doc.Equality], 
 
 
 def _equation(equation: WorkedEquation | str | doc.Equality) -> Markup:
-    """Write one item of a derivation step: a formula as MathML, arithmetic and words as text."""
+    """Write an item of a derivation step: a formula as MathML, arithmetic and prose as text."""
     if isinstance(equation, doc.Equality):
         sides = (notation.catalogued(side, notation.MATHML) for side in (equation.left, equation.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))

@@ -16,14 +16,14 @@ _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
 def markdown(document: doc.AnswerDocument, assets: str) -> str:
-    """Write a document. `assets` is the folder of its drawings; if empty, the document has no drawings."""
+    """Write a document as Markdown. `assets` is the folder of its drawings; if empty, drawings are left out."""
     subject = "Motion-measurement error budget, bistatic SAR."
     texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], uri(assets))]
     return "\n\n".join(text.rstrip("\n") for text in texts if text) + "\n"
 
 
 def pictures(document: doc.AnswerDocument) -> Mapping[str, bytes]:
-    """Return the drawings and images of a document by the names of their files."""
+    """Return the contents of the drawings and images of a document, by file name."""
     files: dict[str, bytes] = {}
     for block in doc.blocks_of(document):
         if isinstance(block, doc.Figure):
@@ -57,7 +57,7 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
 
 
 def _inside(text: doc.Text, badge: str) -> str:
-    """Write one of the texts that make up a line. Its leading spaces are kept, and the text after them is escaped."""
+    """Write a piece of a line of text. Its leading spaces are kept, and the text after them is escaped."""
     if isinstance(text, str):
         return " " * (len(text) - len(text.lstrip(" "))) + _text(text.lstrip(" "))
     return _text(text, badge)
@@ -69,7 +69,10 @@ def _bar(fraction: float) -> str:
 
 
 def _use(fraction: float) -> str:
-    """Draw a utilization as a bar of characters with a mark at the limit, and an arrow if it is beyond the end."""
+    """Draw a utilization as a bar of characters with a mark at the limit.
+
+    An arrow shows that the utilization is beyond the end of the bar.
+    """
     bar = _bar(min(1.0, fraction * _LIMIT_WIDTH / _BAR_WIDTH))
     return f"{bar[:_LIMIT_WIDTH]}┃{bar[_LIMIT_WIDTH:]}{'▶' if fraction > _BAR_WIDTH / _LIMIT_WIDTH else ''}"
 
@@ -148,7 +151,7 @@ def _table(table: doc.TextTable) -> str:
 
 
 def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
-    """Yield a LaTeX block for each formula, and a list for the texts between the formulas."""
+    """Yield a LaTeX block for each formula, and a list of the texts between two formulas."""
     lines: list[str] = []
     for equation in equations:
         if latex := _latex(equation):
@@ -166,7 +169,7 @@ def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Itera
 
 
 def _latex(equation: WorkedEquation | str | doc.Equality) -> str:
-    """A formula as LaTeX; empty for words and for arithmetic."""
+    """Write a formula as LaTeX. The result is empty for prose and for arithmetic."""
     if isinstance(equation, doc.Equality):
         return " = ".join(notation.catalogued(side, notation.LATEX) for side in (equation.left, equation.right))
     if isinstance(equation, WorkedEquation) and equation.formula and notation.is_formula(equation):

@@ -15,16 +15,19 @@ _VERDICT_SGR = {"optimistic": "1;31", "confirmed": "32", "conservative": "33"}  
 
 
 def text(document: doc.AnswerDocument, style: Style) -> str:
-    """Write a document as text. Lines are at most 80 columns wide, and those of tables `style.table_width`."""
+    """Write a document as text.
+
+    Lines are at most 80 columns wide, and lines of tables at most `style.table_width` columns.
+    """
     chapters = ("\n".join(lines(chapter.blocks, style)) for chapter in document.chapters)
     return "\n\n".join(chapters) + "\n"
 
 
 # ---------------------------------------------------------------------- parts of a line
 def plain(line: doc.Text) -> str:
-    """Write a text without its marks, in letters that every terminal has.
+    """Write a text without markup, in characters that every terminal has.
 
-    Bars and colour keys, which repeat numbers, are left out.
+    Bars and colour keys are left out, because they only repeat numbers.
     """
     match line:
         case tuple():
@@ -114,10 +117,10 @@ def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
 
 
 def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
-    """Yield the lines of a table. Statuses have a colour; a missing value is a hyphen instead of a dash.
+    """Yield the lines of a table. Statuses are coloured, and a missing value is a hyphen instead of a dash.
 
-    A name that would make its line longer than the width of tables is written on a line above its values. A sentence
-    in the last column is written on lines of its own below them if it does not fit.
+    A name too long for the width of tables is written on a line above its values. If a sentence in the last column
+    does not fit, it is written on separate lines below the values.
     """
     heads = [[plain(head.text) for head in table.heads]]
     heads += [[head.unit for head in table.heads]] if any(head.unit for head in table.heads) else []
@@ -147,7 +150,7 @@ def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
 
 
 def _coloured(row: doc.Line, text: str, style: Style) -> str:
-    """Colour the statuses of a row in its line `text`."""
+    """Colour the statuses of a row in `text`, which is the line of this row."""
     if not style.color:
         return text
     for place, cell in enumerate(row):

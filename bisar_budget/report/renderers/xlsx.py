@@ -1,6 +1,6 @@
-"""Write an answer as a workbook for Excel and the like: its text, its tables, and its numbers in SI units.
+"""Write an answer as a workbook for Excel and similar programs: its text, its tables, and its numbers in SI units.
 
-The same answer gives the same bytes.
+The same answer always gives the same bytes.
 """
 
 import re
@@ -60,7 +60,10 @@ def workbook(document: doc.AnswerDocument, records: Records) -> bytes:
 
 
 def _texts(document: doc.AnswerDocument) -> Iterator[list[str]]:
-    """Yield the cells of each line of text: of facts a name and a value, of other blocks one text."""
+    """Yield the cells of each line of text.
+
+    A fact has two cells, for its name and its value. A line of another block has a single cell.
+    """
     yield from ([plain(name), plain(value)] for name, value in document.facts.pairs)
     for block in doc.blocks_of(document):
         match block:
@@ -113,7 +116,7 @@ def _number_or_text(value: object) -> str | float | None:
 
 
 def _append(sheet: "Worksheet", cells: Sequence[str | float | None], *, is_head: bool = False) -> None:
-    """Add a line to a sheet. A text that looks like a formula remains a text."""
+    """Append a line to a sheet. A string that looks like a formula is written as text."""
     from openpyxl.styles import Font
 
     line = sheet.max_row + 1 if sheet.max_row > 1 or sheet["A1"].value is not None else 1
@@ -138,7 +141,7 @@ def _fit(sheet: "Worksheet") -> None:
 
 
 def _undated(file: BytesIO) -> bytes:
-    """Return the bytes of a ZIP archive with the same files, all of them without a date."""
+    """Return the bytes of a ZIP archive with the same files but without their dates."""
     undated = BytesIO()
     with ZipFile(file) as dated, ZipFile(undated, "w", ZIP_DEFLATED) as archive:
         for name in dated.namelist():

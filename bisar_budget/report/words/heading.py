@@ -48,14 +48,14 @@ class AboutMission(Protocol):
 
 
 def rule_words(mission: MissionFindings) -> str:
-    """Text that names the model and the rule of combination by which a mission is judged."""
+    """Text that names the model and the combination rule by which a mission is evaluated."""
     return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
 def overrides_words(mission: AboutMission, *, with_changes: bool = True) -> str:
-    """Text about the settings from outside the file that affect the verdict; empty if there are none.
+    """Text about the settings from outside the file that affect the verdict; empty if there are no such settings.
 
-    Unless `with_changes` is true, values from `--set` are left out.
+    If `with_changes` is false, values from `--set` are left out.
     """
     return "; ".join(_overrides(mission, with_changes=with_changes))
 
@@ -69,14 +69,14 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
 
 
 def other_overrides(mission: AboutMission) -> list[str]:
-    """Texts about the settings from outside the file other than `--set`, one for each."""
+    """Texts about the settings from outside the file, without `--set`. Each setting has its own text."""
     return _overrides(mission, with_changes=False)
 
 
 def overrides_lines(mission: AboutMission) -> list[str]:
-    """Lines with the overrides other than `--set`, for a terminal.
+    """Lines for a terminal with the overrides, except for `--set`.
 
-    All are on one line, or each is on its own line if they do not fit.
+    They are on a single line if they fit, otherwise each is on its own line.
     """
     overrides = _overrides(mission, with_changes=False)
     line = f"Overrides: {'; '.join(overrides)}"
@@ -95,7 +95,7 @@ def file_words(mission: AboutMission) -> str:
 def title_lines(
     mission: AboutMission, verdict: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
 ) -> Iterator[str]:
-    """Yield the lines above an answer: coloured verdict, `more` lines, file and name of the mission, overrides."""
+    """Yield the lines above an answer: coloured verdict, the lines `more`, file and name of the mission, overrides."""
     first, *continuation = wrapped(verdict, "  ")
     yield style.coloured(first, sgr)
     yield from continuation
@@ -189,7 +189,7 @@ def _peak_loss(loss_db: float) -> str:
 
 
 def path_words(path: FlownPath) -> str:
-    """Text about a platform path: its source, the fitted polynomials, and their distance from fixes or orbit."""
+    """Text about a platform path: its source, the fitted polynomials, and the deviation from fixes or orbit."""
     text = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
         direction = "old" if path.age >= 0 else "ahead"

@@ -1,8 +1,8 @@
 """Name a mission and its findings in a way that does not depend on the current folder or the machine.
 
-They are used for the ids of needs, fingerprints and test cases. The name of a mission is the number of its document,
-else the path of its file within the repository, else the file name. A relative path, an absolute path and a symbolic
-link to the same file all give the same name.
+The names are used for the ids of needs, fingerprints and test cases. The name of a mission is the number of its
+document, else the path of its file within the repository, else the file name. A relative path, an absolute path and a
+symbolic link to the same file all give the same name.
 """
 
 import os
@@ -20,7 +20,7 @@ _STANDARD_INPUT = "standard input"
 class Identity(NamedTuple):
     """Name of a mission, unique among the files of a run, and the path of its file in reports.
 
-    `shared` are the pairs of requirement id and row id that identify a finding only together with the mission name.
+    `shared` holds the pairs of requirement id and row id that identify a finding only together with the mission name.
     """
 
     name: str
@@ -30,8 +30,8 @@ class Identity(NamedTuple):
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
         """Unique name of a row or requirement: its first requirement id in the project, and its id `subject`.
 
-        If it has no requirement id, the mission name comes first. If the pair is in `shared`, the mission name is
-        inserted between the two.
+        If it has no requirement id, the mission name replaces it. If the pair is in `shared`, the mission name is
+        inserted between both ids.
         """
         if requirement_id is None:
             return self.name, subject
@@ -43,8 +43,9 @@ class Identity(NamedTuple):
 def identities(missions: Sequence[MissionFindings | UnusableMission], style: Style) -> list[Identity]:
     """Identities of the missions of a run. The names do not depend on the order of the missions.
 
-    If several missions have the same document number, the path is appended to the number. If files have the same
-    path, in different repositories or outside any, parent folders are added until the paths differ.
+    If several missions have the same document number, the path is appended to the number. If several files have the
+    same path, because they are in different repositories or in no repository, parent folders are added until the
+    paths differ.
     """
     locations = [_locate(mission.file, style) for mission in missions]
     files = [location.file for location in locations]
@@ -60,7 +61,10 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
 
 
 def digest(*items: str) -> str:
-    """SHA-256 digest of a name, the same on every machine. File names that are invalid in UTF-8 are accepted."""
+    """SHA-256 digest of a name, the same on every machine.
+
+    File names that are not valid UTF-8 are accepted.
+    """
     from hashlib import sha256  # OpenSSL takes 5 ms to load; a check to a terminal does not need it
 
     return sha256("\0".join(items).encode(errors="surrogatepass")).hexdigest()
@@ -111,7 +115,7 @@ def _locate(file: str, style: Style) -> _FileLocation:
     """Find the location of a file, and whether a Git work tree contains it.
 
     Links are resolved. If the target is outside every work tree, for example in the store of git-annex in `.git`, the
-    link itself is located. A link without a target, such as that of a pipe, is not resolved.
+    link itself is located. A link without an existing target, such as the link of a pipe, is not resolved.
     """
     if file == "-":
         return _FileLocation(_STANDARD_INPUT, _STANDARD_INPUT)
@@ -130,7 +134,7 @@ def _locate(file: str, style: Style) -> _FileLocation:
 
 
 def _work_tree(folder: str, style: Style) -> str:
-    """Nearest folder, from `folder` upwards, that contains `.git` or is GitHub's checkout; empty if there is none.
+    """Nearest folder, from `folder` upwards, that contains `.git` or is the checkout of GitHub; empty if not found.
 
     In worktrees and submodules `.git` is a file.
     """
@@ -149,13 +153,16 @@ def _below(file: str, folder: str) -> str:
 
 
 def _alike(names: Mapping[str, str]) -> list[str]:
-    """Files whose name in `names` is also the name of another file."""
+    """Files that share their name in `names` with another file."""
     uses = Counter(names.values())
     return [file for file, name in names.items() if uses[name] > 1]
 
 
 def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
-    """Extend equal paths by parent folders until all paths differ, which absolute paths always do."""
+    """Prepend parent folders to equal paths until all paths differ.
+
+    This always succeeds, because absolute paths differ.
+    """
     names, added = dict(paths), 0
     while alike := _alike(names):
         added += 1
@@ -164,14 +171,17 @@ def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
 
 
 def _with_folders(file: str, path: str, count: int) -> str:
-    """Path of a file, extended by `count` parent folders."""
+    """Path of a file with `count` more parent folders than `path`."""
     full_path = file.replace(os.sep, "/")
     folders, length = full_path.strip("/").split("/"), path.count("/") + 1 + count
     return "/".join(folders[-length:]) if length <= len(folders) else full_path
 
 
 def _own_ids(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Yield the ids of rows and requirements that have requirement ids, each with the first of these."""
+    """Yield the id of each row and requirement that has requirement ids in the project.
+
+    Each id is paired with the first of these requirement ids.
+    """
     for requirement in mission.requirements:
         if requirement.requirement_ids:
             yield id_of_requirement(requirement.key), requirement.requirement_ids[0]

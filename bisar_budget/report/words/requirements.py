@@ -27,11 +27,11 @@ REQUIREMENT_COLUMNS = ("requirement", "allowed", "reached", "use", "status", "de
 
 
 class RequirementLine(NamedTuple):
-    """One line of the table of requirements, as texts.
+    """One line of the table of requirements, as strings.
 
-    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` names the share of the
-    requirement to which the utilization `use` refers, with the reached and allowed values of the share. It also has
-    the autofocus gain and the waivers. `texts` are the texts of its requirement ids.
+    `decided_by` is the deciding row, or the reason why the requirement could not be judged. `remark` names the share
+    of the requirement to which the utilization `use` refers, with the reached and allowed values of the share. It
+    also gives the autofocus gain and the waivers. `texts` are the texts of the requirement ids.
     """
 
     requirement: JudgedRequirement
@@ -51,7 +51,7 @@ def requirement_id(requirement: JudgedRequirement) -> str:
 
 
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
-    """Yield the lines of the table of requirements, in the order in which the JSON document lists them."""
+    """Yield the lines of the table of requirements, in the order of the JSON document."""
     for requirement in mission.requirements:
         is_open = requirement.is_unjudged
         remark = ", ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)])
@@ -70,9 +70,9 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 
 def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
-    """Yield remarks on why the utilization of a requirement is not its reached value over its allowed value.
+    """Yield remarks for a requirement whose utilization differs from the ratio of reached to allowed value.
 
-    They name the row with the largest utilization, the share that decides, and the autofocus gain.
+    They name the row with the largest utilization, the deciding share, and the autofocus gain.
     """
     if requirement.is_unjudged or requirement.value is None:
         return
@@ -100,9 +100,9 @@ def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
 
 
 def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | None]:
-    """Owner, allowed and reached value of the deciding share, and autofocus gain, by name of the output column.
+    """Deciding share of a requirement and its autofocus gain, by name of the output column.
 
-    The values of the share are None if no share decides.
+    The share has three columns: owner, allowed value and reached value. They are None if no share decides.
     """
     share = requirement.share
     return {
@@ -114,7 +114,10 @@ def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | Non
 
 
 def confidence_words(mission: MissionFindings) -> str:
-    """Text with the confidence at which a mission meets its requirements, after a space; empty if one fails."""
+    """Text with the confidence at which a mission meets its requirements, beginning with a space.
+
+    It is empty if a requirement is not met.
+    """
     status = STATUS[mission.status]
     return f" {mission.confidence}" if status.is_held and not status.fails else ""
 
@@ -141,9 +144,10 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    """Sentence about the whole mission: all requirements are met, or how many are broken or cannot be judged.
+    """Sentence about the whole mission.
 
-    If `is_brief` is true, the sentence leaves out verbs such as "is".
+    It states that all requirements are met, or how many are broken or cannot be judged. If `is_brief` is true, it
+    leaves out verbs such as "is".
     """
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
@@ -176,9 +180,10 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 
 def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
-    """Text with the number of waived requirements, or of waived rows if there are none, and the ids of the waivers.
+    """Text with the number of waived requirements and the ids of the waivers, as a list.
 
-    The list is empty if nothing is waived, else it has one text.
+    If no requirement is waived, waived rows are counted instead. The list has a single item, and is empty if nothing
+    is waived.
     """
     counts = [sum(item.status == "waived" for item in judged) for judged in (mission.requirements, mission.rows)]
     count, noun = (counts[0], "requirement") if counts[0] else (counts[1], "row")
@@ -191,7 +196,7 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
-    """Text of the verdict on a mission that breaks no requirement. It mentions waivers, warnings or autofocus."""
+    """Verdict on a mission that breaks no requirement. It mentions waivers, warnings or autofocus."""
     text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
@@ -199,9 +204,9 @@ def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
 
 
 class UnjudgedEffect(NamedTuple):
-    """An effect that no requirement judges.
+    """An effect of errors that is not limited by any requirement.
 
-    `text` names the effect and the line to add to the file. `rows` are the rows with the effect.
+    `text` names the effect and the line to add to the mission file. `rows` are the rows with the effect.
     """
 
     text: str
@@ -209,7 +214,7 @@ class UnjudgedEffect(NamedTuple):
 
 
 def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
-    """Effects of declared errors that no requirement judges and that are not negligible."""
+    """Effects of declared errors that are not negligible but are not limited by any requirement."""
     effects: dict[str, tuple[str, list[Row]]] = {}
     for row in mission.rows:
         if row.status not in BROKEN or row.reason is None:
@@ -227,12 +232,15 @@ def _texts(values: object) -> list[str]:
 
 
 def is_explained_in_table(row: Row) -> bool:
-    """Whether the lines below the table of requirements explain why the row is not evaluated."""
+    """Whether the lines below the table of requirements explain why a row is not evaluated."""
     return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
-    """Broken or waived requirements for which no row has the same status, so that the rows do not show them."""
+    """Broken or waived requirements that are not visible in the rows.
+
+    Such a requirement has no row with the same status.
+    """
     statuses = {row.id: row.status for row in mission.rows}
     return [
         requirement
@@ -243,9 +251,9 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
 
 
 def shown_ids(row: Row, mission: MissionFindings) -> list[str]:
-    """Requirement ids of the broken or waived requirements that a row shows, because it has the same status.
+    """Requirement ids of the broken or waived requirements that a row represents, because it has the same status.
 
-    Formats that list only findings do not list these requirements again (`unseen`).
+    Formats that list only findings do not list these requirements separately (see `unseen`).
     """
     ids = [
         own_id
@@ -259,7 +267,10 @@ def shown_ids(row: Row, mission: MissionFindings) -> list[str]:
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Sentence with the number of declared kinds of error, and those that are missing, shifted or without source."""
+    """Sentence with the number of declared kinds of error.
+
+    It also gives the kinds that are missing, off their data sheet, or without a source.
+    """
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
@@ -271,12 +282,15 @@ def declared_words(kinds: DeclaredKinds) -> str:
 
 
 def shifted_names(kinds: DeclaredKinds) -> list[str]:
-    """Texts with each kind of error that a stated level shifts off its data sheet, and with this level."""
+    """Texts for the kinds of error whose values are shifted off the data sheet by a stated level.
+
+    Each text names the kind and its level.
+    """
     return [f"{''.join(kind_names([error.kind]))} {error.level}" for error in kinds.shifted]
 
 
 def kind_names(kinds: Sequence[str]) -> list[str]:
-    """Write kinds of error as texts. A kind that occurs for both platforms is written once."""
+    """Names of kinds of error for output. A kind that occurs for both platforms is written once."""
     owners: dict[str, list[str]] = {}
     for kind in kinds:
         owner, _, error = kind.rpartition(".")
@@ -294,7 +308,8 @@ _NAME_WIDTH = 33  # characters
 def probabilities(drawn: MonteCarlo) -> list[str]:
     """Make the lines of the table of the Monte Carlo result, with warnings and notes.
 
-    The table has the probability that each requirement is met. For comparison it has sums that need no draws.
+    The table has the probability that each requirement is met. For comparison, it also has sums that do not need
+    random draws.
     """
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
@@ -316,7 +331,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
 
 
 def _is_not_drawn(note: Note) -> bool:
-    """Whether a note names errors that are not drawn. Such a note belongs into the first lines of the table."""
+    """Whether a note names errors that are not drawn. Such notes are written above the table."""
     return note.code in ("vibration-is-not-drawn", "stated-power-is-not-drawn")
 
 

@@ -25,7 +25,7 @@ BINDING_WORDS = {
 def matters(row: Row) -> bool:
     """Whether a row is worth showing, because it is declared or limits something.
 
-    A passing row along axes other than those of the file is not worth showing.
+    A passing row along axes that differ from the axes of the file is not worth showing.
     """
     if row.status in ("info", "pass"):
         is_declared = (
@@ -36,7 +36,10 @@ def matters(row: Row) -> bool:
 
 
 def binding_words(row: Row) -> str:
-    """Name of the requirement that sets the allowable of a row; empty if this is the metric of the row itself."""
+    """Name of the requirement that sets the allowable of a row.
+
+    It is empty if this requirement is on the metric of the row itself.
+    """
     return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
 
 
@@ -116,12 +119,12 @@ _LISTED_COUNT = 3  # waivers whose ids a sentence lists
 
 
 def waiver_names(ids: Sequence[str]) -> str:
-    """Text such as `waiver receiver.*` with up to three waiver ids as in the file, and how many more there are."""
+    """Text such as `waiver receiver.*` with up to three waiver ids as in the file, and the number of further ids."""
     return f"waiver{'s' if len(ids) > 1 else ''} {_listed_ids(ids)}"
 
 
 def waived_count(count: int, ids: Sequence[str]) -> str:
-    """Text with the number of waived items and ids of their waivers: `12 waived (mission.location_error)`."""
+    """Text with the number of waived items and the ids of their waivers: `12 waived (mission.location_error)`."""
     return f"{count} waived ({_listed_ids(ids)})" if ids else f"{count} waived"
 
 
@@ -136,13 +139,13 @@ def dotted(path: KeyPath) -> str:
 
 
 def sentence(text: str) -> str:
-    """Capitalize the first letter of a text, unless the text begins with the name of a row or a file."""
+    """Capitalize the first letter of a text, unless the text begins with the name of a row or file."""
     first = text.partition(" ")[0].rstrip(",:;")
     return text[:1].upper() + text[1:] if first.replace("-", "").isalpha() else text
 
 
 def dashed(text: str) -> str:
-    """Replace a text that is only a hyphen by an en dash, the sign for a missing value on pages."""
+    """Replace a text by an en dash if it is only a hyphen. An en dash marks a missing value on pages."""
     return "–" if text == "-" else text
 
 
@@ -152,7 +155,7 @@ _LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image
 
 
 def is_noise_level(row: Row) -> bool:
-    """Whether the numbers of a row are in dB, as levels of a noise spectrum relative to the declared spectrum."""
+    """Whether the numbers of a row are levels of a noise spectrum in dB, relative to the declared spectrum."""
     return row.unit == "dB" and row.subject.axis == row.subject.facts.spectrum_axis
 
 
@@ -176,9 +179,9 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row, rounded down, so that it passes when it is copied into a file.
+    """Write the allowable of a row, rounded down, so that the row passes if the value is copied into a file.
 
-    Levels of the image (rows of PSLR and ISLR) are rounded to the nearest value, because no file declares them.
+    Image levels (rows of PSLR and ISLR) are rounded to nearest, because they are never copied into a file.
     """
     kind = row.subject.facts
     is_level = isinstance(kind, SumKind) and kind.is_level
@@ -186,9 +189,10 @@ def row_limit(row: Row, mission: MissionFindings) -> str:
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row. Without one, write a dash for an unjudged row, else `no limit`.
+    """Write the allowable of a row.
 
-    Rows about PSLR, ISLR and required declarations have a dash too.
+    If there is no allowable, a row that is not judged gets a dash, as do rows for PSLR, ISLR and required
+    declarations. All further rows get `no limit`.
     """
     if row.allowable is not None:
         return row_limit(row, mission)
@@ -197,7 +201,7 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 
 def shown_use(row: Row) -> float | None:
-    """Utilization of a row to show; None if the row has no limit, or if it cannot be judged, waived or not."""
+    """Utilization of a row to show; None if the row has no limit, or if it cannot be judged, even if waived."""
     return None if row.allowable is None or row.is_unjudged or row.status == "not_evaluated" else row.utilization
 
 
@@ -213,7 +217,10 @@ def phase_limit(value: float, mission: MissionFindings) -> str:
 
 
 def requirement_limit(value: float | None, requirement: JudgedRequirement) -> str:
-    """Write the limit of a requirement or of a share. Levels in dB are rounded to nearest, other limits down."""
+    """Write the limit of a requirement or of a share.
+
+    Levels in dB are rounded to nearest, all further limits are rounded down.
+    """
     return requirement_size(value, requirement, "nearest" if requirement.key in _LEVEL_REQUIREMENTS else "down")
 
 
@@ -229,7 +236,7 @@ _LEAST_LEVEL_DB = 5e-4  # the level of an echo as strong as its point differs fr
 
 
 def _level(value: float, unit: str) -> float:
-    """Replace a level in dB by 0 if it differs from 0 dB only by rounding. Other values are returned unchanged."""
+    """Replace a level in dB by 0 if it differs from 0 dB only by rounding; any other value is returned unchanged."""
     return 0.0 if unit == "dB" and abs(value) < _LEAST_LEVEL_DB else value
 
 
@@ -332,7 +339,10 @@ def command_text(text: str) -> str:
 
 
 def command_property(text: str) -> str:
-    """Escape a property of a GitHub workflow command, including colons and commas, which would end it."""
+    """Escape a property of a GitHub workflow command.
+
+    Colons and commas are also escaped, because they would end the property.
+    """
     return command_text(text).replace(":", "%3A").replace(",", "%2C")
 
 
@@ -342,7 +352,10 @@ def rst_text(text: str) -> str:
 
 
 def need_text(text: str) -> str:
-    """Escape a field for Sphinx-Needs, which would otherwise run `[[function()]]` and look up `<<variant>>`."""
+    """Escape a field for Sphinx-Needs.
+
+    Sphinx-Needs would otherwise run `[[function()]]` and look up `<<variant>>`.
+    """
     return printable(text).replace("[[", "[ [").replace("<<", "< <")
 
 
@@ -362,7 +375,10 @@ _SIZE_PATTERN = re.compile(
 
 
 def spreadsheet_text(value: str | None) -> str | None:
-    """Put an apostrophe before text that a spreadsheet would run as a formula, even if blanks come first."""
+    """Put an apostrophe before text that a spreadsheet would run as a formula.
+
+    Text that starts with blanks is checked as well.
+    """
     value = printable(value) if value else value
     is_formula = (
         bool(value)
