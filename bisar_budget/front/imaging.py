@@ -11,7 +11,7 @@ from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside
 from bisar_budget.findings.row import where_ids_are
 from bisar_budget.front.checks import outside_of
-from bisar_budget.front.progress import FORMING, foretell, watched
+from bisar_budget.front.progress import FORMING, foretell, is_heard, watched
 from bisar_budget.front.results import SimulateResult, VerifyResult
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
@@ -67,9 +67,10 @@ def verify_all(
             f"--only {printable(only)}: no row with a limit matches, nothing was verified; {where_listed}."
         )
     jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
-    seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
-    advice = "--only looks at some of them" + faster(None if workers else jobs)
-    foretell(seconds, f"Forming the images of {total} rows", advice)
+    if is_heard():
+        seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
+        advice = "--only looks at some of them" + faster(None if workers else jobs)
+        foretell(seconds, f"Forming the images of {total} rows", advice)
     verified_missions: list[VerifiedMission] = []
     with watched(FORMING) as progress:
         for mission in missions:
@@ -136,5 +137,6 @@ def simulate(
 
     scene = targets if isinstance(targets, Targets) else standing(targets)
     with watched(FORMING) as progress:
-        images = simulate_point(mission, progress, image_former=image_former, targets=scene, foreseen=foreseen)
+        told = foreseen if is_heard() else None
+        images = simulate_point(mission, progress, image_former=image_former, targets=scene, foreseen=told)
     return SimulateResult(images, mission)

@@ -27,8 +27,18 @@ _MIN_SHOWN_S = 1.0  # work that takes less time has no bar
 _LEAST_TRIAL_S = 0.3  # a shorter trial is too short to measure
 _TRIAL_GROWTH_FACTOR = 3  # ratio of the sizes of two successive trials
 
+
+def _unheard(_: str) -> None:
+    """Drop a message."""
+
+
 # Function that shows a message to the user who waits; a caller from Python sees only the bar.
-SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda _: None)
+SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=_unheard)
+
+
+def is_heard() -> bool:
+    """Whether messages reach a user. If not, no time needs to be estimated for them."""
+    return SAYING.get() is not _unheard
 
 
 @contextmanager

@@ -132,7 +132,8 @@ _MIN_GROUP_ROWS = 1 << 17  # of a row group, which readers load at once
 def write_parquet(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write a Parquet file with one row for each case, and with units and descriptions as metadata of the fields.
 
-    Strings are dictionary-encoded, and missing values are null. The metadata of the file is the same as in a CSV file.
+    Strings are dictionary-encoded, and missing values are null. The metadata of the file is the same as in a CSV
+    file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -55,7 +55,7 @@ _COUNTS_PER_CYCLE = 2.0**32  # a cycle in 32 bits, so that integer arithmetic dr
 class Lattice(NamedTuple):
     """Lattice of evenly spaced pixels at `origin` + i·`across` + j·`along`.
 
-    These three are vectors (3,). [m] `shape` holds the numbers of values of i and of j.
+    `origin`, `across` and `along` are vectors (3,). [m] `shape` is the number of values of i and of j.
     """
 
     origin: Floats
@@ -64,7 +64,10 @@ class Lattice(NamedTuple):
     shape: tuple[int, int]
 
     def disc(self) -> tuple[Floats, float]:
-        """Centre (3,) and radius of a disc that contains all pixels, with lines extended to whole segments. [m]"""
+        """Centre (3,) and radius of a disc that contains all pixels. [m]
+
+        Each line of pixels is extended to a whole number of segments.
+        """
         i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
         corners = (i * self.across + j * self.along, i * self.across - j * self.along)
@@ -102,28 +105,15 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     return Lattice(origin, across, along, (lines, count))
 
 
-<<<<<<< HEAD
-def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
-    """Form an image by compiled backprojection, with the result of `image_formation.backprojection`.
-
-    All inputs must be finite.
-=======
 def backproject(history: PhaseHistory, points: Floats) -> Complexes | None:
     """Form an image by backprojection, as `image_formation.backprojection` does; all inputs must be finite.
->>>>>>> w_r4
 
     Parameters
     ----------
     history : PhaseHistory
         Frequencies evenly spaced.
     points : (..., 3) ndarray
-<<<<<<< HEAD
-        Positions of the pixels. [m] The function is fastest if they are evenly spaced.
-    spline : "linear" or "cubic"
-        Spline that interpolates the range profiles.
-=======
         Positions of the pixels. It is fastest if they are on a lattice. [m]
->>>>>>> w_r4
 
     Returns
     -------
@@ -172,8 +162,8 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
     """Upper bound of the fifth-order phase that the expansion of ranges over half a segment neglects. [rad]
 
     The expansion of |r + x·e|/|r| in powers of x/|r| has the coefficients (P_{n-2} - P_n)/(2n - 1), with the Legendre
-    polynomials P_n of the cosine between r and the unit vector e. The result is infinite if a platform is so near
-    that the expansion does not converge fast enough.
+    polynomials P_n of the cosine between r and the unit vector e. The result is infinite if a platform is too
+    near for the expansion to converge fast enough.
     """
     centre, radius = lattice.disc()
     half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
@@ -214,10 +204,10 @@ class _Needed(NamedTuple):
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Part of each range profile that pixels between the range sums `nearest` and `farthest` need.
+    """Part of each range profile that pixels with range sums from `nearest` to `farthest` need.
 
     Both range sums are (pulses,). [m] `pixels` is the number of pixels. The result is None if the part has too many
-    samples for this number. A profile is periodic, so its samples repeat if more are needed than it has.
+    samples for so few pixels. A profile is periodic, so if the part is longer than the profile, its samples repeat.
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
     per_metre = cells_per_metre(history, length)
@@ -260,16 +250,12 @@ def _kernel_transform(angle: Floats) -> Floats:
     return transform
 
 
-<<<<<<< HEAD
-def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
-    """Yield the refined part of each range profile that the pixels need, in blocks of pulses that fit into a cache.
-=======
 def _profile_blocks(history: PhaseHistory, needed: _Needed) -> Iterator[_Block]:
     """Refine the part of each profile that the pixels need, in blocks of as many pulses as fit into a cache.
->>>>>>> w_r4
 
-    The part is found from the pixels and not from a sphere around the patch. A resolution cell may be a hundred times
-    longer than wide, and a sphere around such cells would need many more samples. All blocks share the same memory,
+    The needed part is determined from the pixels and not from a sphere around the patch. A resolution cell may be a
+    hundred times longer than wide, and a sphere around such cells would need many more samples. All blocks share the
+    same memory,
     so a block must be used before the next is requested.
     """
     length, factor, order = (
@@ -357,9 +343,9 @@ def _phasor(cycles):
 def _expand(middle, platform, along, ranges):
     """Add the range from one platform to `ranges`, expanded to fourth order along each segment of pixels.
 
-    `middle` (3, segments) are the middles of the segments, and `along` is the vector from pixel to pixel. [m] Row 0
-    of `ranges` (5, segments) is the range at the middle. [m] Row n is the coefficient of the n-th power of the
-    distance from the middle, for n from 1 to 4. [m/pixelⁿ]
+    `middle` (3, segments) holds the middles of the segments, and `along` is the vector from pixel to pixel. [m] Row 0
+    of `ranges` (5, segments) is the range at the middle. [m] Row n, from 1 to 4, is the coefficient of the n-th power
+    of the distance from the middle in pixels. [m/pixelⁿ]
     """
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
@@ -381,10 +367,10 @@ def _expand(middle, platform, along, ranges):
 def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, order):
     """Split the ranges of segments into whole and fractional profile samples, and into fractions of carrier cycles.
 
-    `ranges` are the coefficients of `_expand`. Rows 0 and 1 of `whole_samples` and `fraction` are the sample at the
-    middle of a segment and the samples per pixel. `turn` are the cycles of the orders 0 to 2, as integers in units of
-    2⁻³² cycles without whole cycles. `order` are the cycles of the orders 2 to 4. All are computed in double
-    precision.
+    `ranges` holds the coefficients from `_expand`. Row 0 of `whole_samples` and `fraction` is the sample at the
+    middle of a segment; row 1 is the number of samples per pixel. `turn` holds the carrier cycles of orders 0 to 2,
+    without whole cycles, as integers in units of 2⁻³² cycles. `order` holds the carrier cycles of orders 2 to 4. All
+    are computed in double precision.
     """
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
@@ -403,9 +389,9 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
 
 @_compiled
 def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
-    """Compute the profile sample before each pixel, the pixel's distance from it, and the cycles of the carrier.
+    """Compute the profile sample before each pixel, the distance of the pixel from it, and the carrier cycles.
 
-    They are written to `index`, `between` and `cycles`, (segments, pixels) each. The inputs are the results of
+    The results are written to `index`, `between` and `cycles`, (segments, pixels) each. The inputs are the results of
     `_split`. Cycles up to second order are computed in integers, and higher orders in single precision.
     """
     for i in range(between.shape[0]):
@@ -438,13 +424,8 @@ def _cubic(v):
 
 
 @_compiled
-<<<<<<< HEAD
-def _fetch(profile, index, cubic, fetched):
-    """Copy the profile samples that each pixel needs to `fetched`: two for a linear spline, four for a cubic."""
-=======
 def _fetch(profile, index, fetched):
     """Copy the four profile samples that each pixel needs to `fetched`."""
->>>>>>> w_r4
     for i in range(index.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             n = np.uint64(np.uint32(index[i, j] - _I(1)))
@@ -454,16 +435,8 @@ def _fetch(profile, index, fetched):
 
 
 @_compiled
-<<<<<<< HEAD
-def _add_taps(taps, between, cycles, cubic, real, imag):
-    """Add the interpolated profile value of a pulse, times the phasor of the carrier, to each pixel.
-
-    `taps` are the samples that `_fetch` copied. `real` and `imag` are the parts of the image.
-    """
-=======
 def _add_taps(taps, between, cycles, real, imag):
     """Add the interpolated value of the profile, times the phasor of the carrier, to each pixel."""
->>>>>>> w_r4
     for i in range(real.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             cosine, sine = _phasor(cycles[i, j])
@@ -513,7 +486,10 @@ def _add_lattice(profiles, first, transmitter, receiver, reference, per_metre, c
 
 @_compiled
 def _sums(points, transmitter, receiver, reference, sums):
-    """Write the range sum of each of `points` (3, n) minus the range sum `reference` of a pulse to `sums`. [m]"""
+    """Write the range sum of each point to `sums`, relative to the range sum `reference` of the pulse. [m]
+
+    `points` is (3, n).
+    """
     tx, ty, tz = transmitter[0], transmitter[1], transmitter[2]
     rx, ry, rz = receiver[0], receiver[1], receiver[2]
     for i in range(sums.shape[0]):
@@ -619,13 +595,8 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 
 @_parallel
-<<<<<<< HEAD
-def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
-    """Add the contributions of a block of pulses to scattered pixels (3, n), with the exact range of every pixel."""
-=======
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, image):
     """Add the contributions of a block of pulses to scattered pixels, (3, n), each at its exact range."""
->>>>>>> w_r4
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)

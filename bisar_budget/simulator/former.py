@@ -181,8 +181,8 @@ class PlaneWaves:
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
         """Form the baseband image (nx, ny) at the pixel positions `grid`, (nx, ny, 3). [m]
 
-        The polar format requires positions returned by the method `grid`. `on_pixels` is called with the number of pixels of
-        each block that is formed.
+        The polar format requires positions returned by the method `grid`. `on_pixels` is called with the number of
+        pixels of each block that is formed.
         """
         if not self.is_polar:
             return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)

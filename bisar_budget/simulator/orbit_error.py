@@ -5,6 +5,7 @@ Both orbits are integrated with the full gravity of a flattened Earth. The budge
 """
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -80,9 +81,14 @@ def orbit_error(
     later = np.einsum("kji,kj->ki", turns[::2], apart[:, 0])
     earlier = np.einsum("kij,kj->ki", turns[::2], apart[:, 1])
     differences = np.concatenate((earlier[:0:-1], later))
-    times = np.linspace(-1.0, 1.0, 2 * _STEP_COUNT + 1)  # in halves of the span
-    fitted = np.polynomial.legendre.legfit(times, differences, _ORDER)
-    return np.asarray(np.polynomial.legendre.legval(slow_time / half, fitted).T)
+    return np.asarray(np.polynomial.legendre.legval(slow_time / half, _fit() @ differences).T)
+
+
+@cache
+def _fit() -> Floats:
+    """Matrix that fits Legendre polynomials to values at the ends of all steps, (orders, ends)."""
+    times = np.linspace(-1.0, 1.0, 2 * _STEP_COUNT + 1)
+    return np.asarray(np.linalg.pinv(np.polynomial.legendre.legvander(times, _ORDER)))
 
 
 def _gravity(places: Floats, rotation: Floats) -> Floats:

@@ -306,9 +306,10 @@ def is_even(frequency: Floats) -> bool:
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
     """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums are the given wavenumbers.
 
-    A table of these sums, with a row for each coarse wavenumber, contains the given wavenumbers in order. The last row
-    may extend beyond the given wavenumbers. The phasor of a sum is a product of two phasors, so n wavenumbers need only about 2√n
-    exponentials.
+    A table of these sums, with a row for each coarse wavenumber, contains the given wavenumbers in order. The last
+    row may extend beyond the given wavenumbers. The phasor of a sum is a product of two phasors, so n wavenumbers
+    need
+    only about 2√n exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -408,8 +409,9 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
     """Shortest displacement of each platform that changes the excess range by one metre. [m/m]
 
-    The excess range is the bistatic range minus the baseline, which is the length of the direct path. Both results are (pulses, 3), the transmitter first. The
-    displacement of the transmitter is along u_t − b, and that of the receiver along u_r + b. Here u_t and u_r are the
+    The excess range is the bistatic range minus the baseline, which is the length of the direct path. Both results
+    are (pulses, 3), the transmitter first. The displacement of the transmitter is along u_t − b, and that of the
+    receiver along u_r + b. Here u_t and u_r are the
     unit vectors from the scene centre to the platforms, and b is the unit vector from receiver to transmitter. The
     displacement is zero for a platform whose motion cannot change the bistatic range minus the baseline.
     """

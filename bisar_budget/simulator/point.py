@@ -215,14 +215,15 @@ def simulate_point(
     *,
     image_former: str = "backprojection",
     targets: Targets = A_POINT,
-    foreseen: Callable[[float], None] = lambda seconds: None,
+    foreseen: Callable[[float], None] | None = None,
 ) -> PointImages:
     """Form images of points with the declared errors, before and after autofocus.
 
     Errors have the signs and the coverage factor of the mission file. A covariance has no sign. It is represented by
     the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor. Vibration along
-    the line of sight is part of the data. Wideband vibration is drawn with the seed of the file. The patch is around the displaced points,
-    along the lines of equal range of the measured paths, and long enough for the smear and the paired echoes. The
+    the line of sight is part of the data. Wideband vibration is drawn with the seed of the file. The patch is around
+    the displaced points, along the lines of equal range of the measured paths, and long enough for the smear and the
+    paired echoes. The
     error-free image is formed by the same processor. Its data are those of points at the displaced positions,
     recorded as if the platforms flew the measured paths.
 
@@ -237,9 +238,9 @@ def simulate_point(
         by backprojection. In the paper, too, Figure 5 is formed by (4) and Figure 6 by (14).
     targets : Targets
         Points and clutter of the scene. Clutter is one random scatterer for each resolution cell of the patch.
-    foreseen : callable
+    foreseen : callable, optional
         Called before the images are formed, with the time that this will take [s]. The time is estimated from a trial
-        with a few pulses and pixels.
+        with a few pulses and pixels. Without it there is no trial.
 
     Raises
     ------
@@ -295,15 +296,20 @@ def simulate_point(
 
         return by.image(data, grid, on_pixels)
 
-    trial_start, trial_times = time.perf_counter(), cell_centres(T, _TRIAL_PULSES)
-    trial_flight = collection.flight(slow, trial_times)
-    scatterer_places = np.pad(np.concatenate((target_points, clutter)), ((0, 0), (0, 1)))
-    trial_history = collection.record(
-        trial_flight, scatterer_places, amplitudes.astype(complex), trial_times, plan.frequencies
-    )
-    recording = 2 * (time.perf_counter() - trial_start) * plan.pulses / trial_times.size
-    rotating = 2 * former.seconds(trial_history, plan.pulses, lines)
-    foreseen(recording + rotating + scene_former.seconds(trial_history, plan.pulses, scene))
+    def seconds() -> float:
+        """Estimate the time to record and to form all images. [s]"""
+        start_time, trial_times = time.perf_counter(), cell_centres(T, _TRIAL_PULSES)
+        trial_flight = collection.flight(slow, trial_times)
+        scatterer_places = np.pad(np.concatenate((target_points, clutter)), ((0, 0), (0, 1)))
+        trial_history = collection.record(
+            trial_flight, scatterer_places, amplitudes.astype(complex), trial_times, plan.frequencies
+        )
+        recording = 2 * (time.perf_counter() - start_time) * plan.pulses / trial_times.size
+        rotating = 2 * former.seconds(trial_history, plan.pulses, lines)
+        return recording + rotating + scene_former.seconds(trial_history, plan.pulses, scene)
+
+    if foreseen is not None:
+        foreseen(seconds())
     as_declared = collection.flight(declared, slow_time, rng)
     data = history(as_declared, np.concatenate((target_points, clutter - np.asarray(effect.displacement))))
     try:

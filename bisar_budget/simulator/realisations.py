@@ -140,7 +140,8 @@ def _swing_motions(
 ) -> dict[str, _Motions]:
     """Draw the antenna motion that an attitude error causes through the lever arm.
 
-    The largest component of the attitude error has a standard deviation of 1 rad. The acceleration error due to the tilt is not included.
+    The largest component of the attitude error has a standard deviation of 1 rad. The acceleration error due to the
+    tilt is not included.
     """
     motion, swings = _motion(mission, error.owner), _swings(mission, error.owner, times)
     assert swings is not None

@@ -2,8 +2,9 @@
 
 An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace the response. The
 coefficient of order 2 times 3/2 is the quadratic phase at the aperture edge. The coefficient of order 3 times 5/2 is
-the cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is (2n +
-1)·jₙ(πfT), so a spectrum is integrated with the square of this factor. A range error has the one-way phase k·x, k =
+the cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is
+(2n + 1)·jₙ(πfT), so a spectrum is integrated with the square of this factor. A range error has the one-way phase k·x,
+k =
 2π/λ. All formulas are derived here; the paper has no random errors.
 
 Spectra are one-sided. Values are for one sigma. Axes and platforms are independent.

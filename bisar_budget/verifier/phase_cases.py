@@ -48,8 +48,9 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
     """Verify the limit on the quadratic phase of a vibration with less than one cycle per aperture.
 
-    An image is formed for each axis, with vibration along only this axis and with the worst starting phase. The phases
-    measured in these images are added. For a vibration along several axes, the amplitudes are scaled until the sum of
+    An image is formed for each axis, with vibration along only this axis and with the worst starting phase. The
+    phases measured in these images are added. For a vibration along several axes, the amplitudes are scaled until the
+    sum of
     the phases computed from exact ranges reaches the limit.
     """
     name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)

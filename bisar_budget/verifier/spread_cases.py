@@ -713,7 +713,7 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on errors at a limit: the ISLR that they add to an image is compared with the ISLR that `owner` may add.
+    """Verdict on errors at a limit: the ISLR that they add to an image is compared with the share of `owner`.
 
     `members` are random errors, each drawn as time series. `white` is the rms phase of additional white noise.
     [rad] Legendre orders up to `order` are removed from the time series and from the noise. `echoes` are tones, each
@@ -854,7 +854,7 @@ class Mainlobe:
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """Increase of the ISLR, as a power ratio in dB, if errors move the fraction `lost` of the image energy to sidelobes."""
+        """Increase of the ISLR if errors move the fraction `lost` of the image energy to sidelobes. [dB]"""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 

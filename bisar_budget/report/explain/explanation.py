@@ -534,7 +534,7 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the combined quadratic phase of all errors of the row's owner, and its limit."""
+    """Yield the explanation steps for the combined quadratic phase of all errors of one owner, and for its limit."""
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
     rule, gain = findings.combine, allocation.autofocus_gain

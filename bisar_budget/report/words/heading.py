@@ -95,7 +95,7 @@ def file_words(mission: AboutMission) -> str:
 def title_lines(
     mission: AboutMission, verdict: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
 ) -> Iterator[str]:
-    """Yield the lines above an answer: coloured verdict, the lines `more`, file and name of the mission, overrides."""
+    """Yield the lines above an answer: coloured verdict, then `more`, file and name of the mission, overrides."""
     first, *continuation = wrapped(verdict, "  ")
     yield style.coloured(first, sgr)
     yield from continuation
