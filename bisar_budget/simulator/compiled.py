@@ -35,7 +35,7 @@ _TILE_ROWS = 16  # lines of one tile; the part of a pulse that a tile reads stay
 _FFT_OVERSAMPLING_FACTOR = 2  # oversampling of profiles that the FFT gives
 _KERNEL_SAMPLES = 8  # width of the kernel that refines profiles; its error is -140 dB at this oversampling
 _REFINEMENT_FACTOR = 8  # refined samples per sample from the FFT
-_SPLINE_ORDER = 3  # of the B-spline, which has one tap more
+_BSPLINE_ORDER = 3  # the spline has one tap more
 _RANGE_MARGIN_SAMPLES = 8  # samples beyond the last pixel on each side
 _BLOCK_BYTES = 24e6  # size of the profiles in memory at once, about that of a processor's last cache
 _MAX_SAMPLES_PER_PIXEL = 8  # with more, refining takes longer than reading each pixel with the kernel itself
@@ -261,7 +261,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed) -> Iterator[_Block]:
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
         _REFINEMENT_FACTOR,
-        _SPLINE_ORDER,
+        _BSPLINE_ORDER,
     )
     coarse = cells_per_metre(history, length)
     harmonic = harmonics(history)
