@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from datetime import date
 from typing import TYPE_CHECKING
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
 from bisar_budget.extras import install_command
 from bisar_budget.faults import printable
@@ -60,7 +61,8 @@ def verify_all(
     `outside` describes influences on the verdicts from outside the mission files. The other arguments and the
     exceptions are those of `verify`.
     """
-    total = sum(len(rows_to_verify(mission, only)) for mission in missions)
+    analysed = [(mission, Analysis(mission)) for mission in missions]
+    total = sum(len(rows_to_verify(mission, only, analysis)) for mission, analysis in analysed)
     if not total and only != "*":
         where_listed = where_ids_are(missions[0].file)
         raise QuestionError(
@@ -68,18 +70,19 @@ def verify_all(
         )
     jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
     if is_heard():
-        seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
+        seconds = sum(seconds_to_verify(mission, only, jobs, analysis) for mission, analysis in analysed)
         advice = "--only looks at some of them" + faster(None if workers else jobs)
         foretell(seconds, f"Forming the images of {total} rows", advice)
     verified_missions: list[VerifiedMission] = []
     with watched(FORMING) as progress:
-        for mission in missions:
+        for mission, analysis in analysed:
             before = sum(len(verified.rows) for verified in verified_missions)
 
             def formed(done: int, _: int, before: int = before) -> None:
                 progress(before + done, total)
 
-            images = verify_mission(mission, only, jobs, formed, workers.mapped if workers else None)
+            mapped = workers.mapped if workers else None
+            images = verify_mission(mission, only, jobs, formed, mapped, analysis)
             options = overrides(mission._replace(waivers=()), outside, date.min)  # images waive nothing
             verified_missions.append(images._replace(overrides=options))
     return verified_missions

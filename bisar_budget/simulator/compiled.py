@@ -4,10 +4,10 @@ Import this module only where a missing Numba is handled.
 
 Range profiles are refined until a cubic B-spline, which has four taps, can interpolate them. The spectrum is divided
 by the transform of the spline, which is known in closed form. On a lattice of pixels, the range is computed exactly
-in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For other pixels it is
-computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or integers. Only the
-fractions that remain are in single precision. The accuracy therefore does not depend on the position of the scene and
-on the wavelength.
+in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For pixels that are not
+on a lattice it is computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or
+integers. Only the remaining fractions are in single precision. The accuracy therefore does not depend on the position
+of the scene or on the wavelength.
 """
 
 import math
@@ -255,8 +255,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed) -> Iterator[_Block]:
 
     The needed part is determined from the pixels and not from a sphere around the patch. A resolution cell may be a
     hundred times longer than wide, and a sphere around such cells would need many more samples. All blocks share the
-    same memory,
-    so a block must be used before the next is requested.
+    same memory, so a block must be used before the next is requested.
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from bisar_budget.analysis.allocation import ROOM
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
@@ -62,6 +63,7 @@ def verify_mission(
     jobs: int = 1,
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
+    analysis: Analysis | None = None,
 ) -> VerifiedMission:
     """Verify every limit of a mission whose row id matches the glob pattern `only`.
 
@@ -69,9 +71,10 @@ def verify_mission(
     do not depend on `jobs`, the number of processes. After each row `progress` is called with the number of finished
     rows and the number of all rows. `mapped`, if given, is a function that computes the rows on remote workers
     instead of in processes on this machine.
+    `analysis` is that of the mission, if the caller has made it.
     """
     mission = mission._replace(places={})  # the places of keys cannot be sent to a process and are not needed
-    all_cases = cases(Study(mission), only)
+    all_cases = cases(Study(mission, analysis), only)
     row_ids = list(all_cases)
     jobs = min(jobs, len(row_ids))
     if mapped is None and jobs > 1:
@@ -92,9 +95,9 @@ def verify_mission(
     )
 
 
-def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
+def rows_to_verify(mission: Mission, only: str = "*", analysis: Analysis | None = None) -> list[str]:
     """List the ids of the rows that `verify_mission` would verify."""
-    return list(cases(Study(mission), only))
+    return list(cases(Study(mission, analysis), only))
 
 
 def cases(study: Study, only: str = "*") -> dict[str, Case]:
@@ -246,7 +249,7 @@ class _Sizes(PointCollection):
         raise _NotFormedError("its size is known")
 
 
-def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
+def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1, analysis: Analysis | None = None) -> float:
     """Estimate the time that `verify_mission` will take. [s]
 
     The time per pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. It is
@@ -254,7 +257,7 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
     minute, no time is measured, and the result is 0. It is also 0 if hardly any image can be formed.
     """
     mission = mission._replace(places={})
-    study = Study(mission)
+    study = Study(mission, analysis)
     study.collection = sizes = _Sizes(mission, study)
     row_cases = cases(study, only)
     for case in row_cases.values():
@@ -263,7 +266,7 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
     image_sizes = [max(1.0, size) for size in sizes.asked]
     if _NEIGHBOUR_FACTOR * sum(image_sizes) * _SLOWEST_IMAGE_S <= _LONG_S:
         return 0.0
-    study = Study(mission)
+    study = Study(mission, study.analysis)
     try:
         study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compile and import before the time is measured
         smallest_seconds = _seconds(study, CUT_CELLS)

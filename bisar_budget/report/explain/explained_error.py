@@ -57,7 +57,10 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
 
 
 def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
-    """Yield the step that converts errors in another frame to the declared error along an axis of the scene."""
+    """Yield the explanation step that converts errors stated in another frame to the axes of the scene.
+
+    The result is the declared error along `axis`.
+    """
     platform, kind = source.owner, source.subject.kind
     error = getattr(mission.platforms, platform).motion_error
     axes = getattr(mission.platforms, platform).state.frame(error.frame)
@@ -239,7 +242,10 @@ def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> Error
 
 
 def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error that both platforms share; the phases of both legs add with their signs."""
+    """Yield the explanation steps for an error that both platforms share.
+
+    The phases of both legs add with their signs.
+    """
     _, _, kind, axis, *_ = source.subject
     has_phase = isinstance(source.kind, StateKind) and source.kind.order > 0
     values = {}
@@ -262,7 +268,10 @@ def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: s
 
 
 def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for a time tag error: its position and velocity errors, and its published phase."""
+    """Yield the explanation steps for a time tag error.
+
+    They give its position and velocity errors, and its published phase.
+    """
     for name in (PLATFORMS[index] for index in source.platforms):
         state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
@@ -289,7 +298,10 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 
 
 def _registered_effect(source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error of a registered kind: the description of the kind, and its published phase."""
+    """Yield the explanation steps for an error of a registered kind.
+
+    They give the description of the kind, and the published phase of the error.
+    """
     assert isinstance(source.kind, MotionKind)
     yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
     unit = f"rad per {source.unit}"
@@ -301,7 +313,7 @@ def _registered_effect(source: ErrorSource, size: float, each: str) -> Iterator[
 
 
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
-    """Return the step that multiplies the effect of one unit by the declared size."""
+    """Return the explanation step that multiplies the effect of one unit by the declared size."""
     values = {"QPE/unit": abs(float(source.effect.qpe)), "declared": size}
     qpe = abs(float(source.effect.qpe)) * size
     return step(f"Quadratic phase error{each}", WorkedEquation("QPE", "QPE/unit*declared", values, qpe, "rad"))
@@ -321,7 +333,7 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
 
 
 def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error with equal components in the frames of both platforms.
+    """Yield the explanation steps for an error with equal components in the frames of both platforms.
 
     The projected effects of both platforms add with their signs.
     """
@@ -357,7 +369,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
 
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
-    """Yield the step that computes the displacement of the image, equation (25)."""
+    """Yield the explanation step that computes the displacement of the image, equation (25)."""
     published, by_table = analysis.published, source.effect
     if published.degeneracy or source.declared is None:
         return
@@ -567,7 +579,10 @@ class Residual:
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
     def rest_steps(self) -> Iterator[Step]:
-        """Yield the steps that list the part of the range error beyond the cubic order and compute its rms phase."""
+        """Yield the explanation steps for the part of the range error beyond the cubic order.
+
+        They list this part at the nodes and compute its RMS phase.
+        """
         yield step("Beyond P₃ there", *self.listed(self.beyond))
         terms = self._products(self.beyond)
         wavelength = number(self.radar.wavelength)
@@ -661,7 +676,10 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
 
 
 def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
-    """Yield, for each platform in free fall, a step with its position error at the first and last node of the fit."""
+    """Yield an explanation step for each platform in free fall.
+
+    It gives the position error of the platform at the first and last node of the fit.
+    """
     if source.shifts is None:
         return
     times = analysis.exact.times[:, 0].tolist()
@@ -704,7 +722,10 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
 def at_the_allowable(
     analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
 ) -> Iterator[Step]:
-    """Yield the steps that check an allowable found by a search: an error of this size just reaches the limit."""
+    """Yield the explanation steps that check an allowable found by a search.
+
+    They show that an error of this size just reaches the limit.
+    """
     sizes = [Residual(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(residual.ranges for residual in sizes):
         return

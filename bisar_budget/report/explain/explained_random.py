@@ -129,7 +129,10 @@ def _inertial(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for an inertial sensor by the published model, with the line of sight at mid-aperture."""
+    """Yield the explanation steps for an inertial sensor by the published model.
+
+    This model keeps the line of sight as it is at mid-aperture.
+    """
     mission, figure = analysis.mission, error.subject.axis
     symbol = _SYMBOLS[figure]
     formulas = inertial_phases(symbol)
@@ -194,7 +197,10 @@ _TILT_GROWTH = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N
 
 
 def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps with the lever arm at mid-aperture, and its motion along the line of sight per tilt."""
+    """Yield the explanation steps for a lever arm.
+
+    They give the arm at mid-aperture, and its motion along the line of sight for one radian of tilt.
+    """
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     state, motion = platform.state, platform.motion_error
@@ -431,7 +437,7 @@ def _power_of_f(exponent: float) -> str:
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """Yield the step for the drift of a clock since it was last set.
+    """Yield the explanation step for the drift of a clock since it was last set.
 
     The step gives the standard deviations of the constant [m] and linear [m/s] range error, and their correlation.
     """
@@ -462,7 +468,10 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
 def _integrals(
     pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization | None, unit: str = "rad"
 ) -> Iterator[Step]:
-    """Yield the steps that integrate each piece of a spectrum to the quadratic phase, cubic phase and residual."""
+    """Yield the explanation steps that integrate each piece of a spectrum.
+
+    The integrals give the quadratic phase, the cubic phase and the residual.
+    """
     T, interval = mission.collection.aperture_time, None if sync is None else sync.interval
     if sync is not None and sync.is_direct_path:
         geometry, delay = mission.geometry, mission.geometry.echo_delay
@@ -557,7 +566,10 @@ def _spectrum(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for an oscillator that is accelerated by random vibration, slow tones or a turning platform."""
+    """Yield the explanation steps for an oscillator under acceleration.
+
+    The acceleration comes from random vibration, slow tones or a turning platform.
+    """
     mission, name = analysis.mission, error.owner
     f_0, sync = mission.radar.center_frequency, mission.synchronization
     felt_vibration = felt(mission, name)

@@ -602,7 +602,10 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
 
 
 def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps to the largest difference in quadratic phase between the edge and the centre of the scene."""
+    """Yield the explanation steps for the spatial variance of the quadratic phase.
+
+    It is the largest difference in quadratic phase between the edge and the centre of the scene.
+    """
     scene = findings.scene
     if scene is None or scene.degeneracy or row.declared is None:
         return
