@@ -340,6 +340,7 @@ class ScenePhases:
         worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
         differences[error, point] = np.copysign(worst, differences[error, point])
 
+    # The next three follow exact ranges, and only scenes with a large error need them.
     @cached_property
     def _rows(self) -> Indices:
         """Index of the block of lanes in `_lanes` for each sign of each large error, (2, errors and parts).
@@ -372,7 +373,7 @@ class ScenePhases:
             phases[:, i] = self.errors.quadratic_by_sign(self.members[i])
         return phases
 
-    @cached_property
+    @cached_property  # not needed for single points, nor where a part of the edge has no image
     def more(self) -> Floats:
         """Exact quadratic phase at the scene centre minus the first-order phase, (errors and parts, cases). [rad]
 
@@ -780,7 +781,7 @@ class Corrections:
         self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
         self.farthest = np.maximum(_SCENE.max_radius_fraction * self.phases.nearest, edges.radius)
 
-    @cached_property
+    @cached_property  # a slow search, which a case without an image at the edge does not need
     def served(self) -> Floats:
         """Radius up to which a single autofocus correction is sufficient, (cases,). [m]
 

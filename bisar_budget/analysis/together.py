@@ -4,8 +4,7 @@ The errors may be combined for the whole mission, or for an owner of a share: tr
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,6 +47,20 @@ class Together:
         Errors of sensors, clocks and the air. Errors without a declared size have no effect.
     groups : sequence of Correlated
         Covariances that the mission declares, each for six errors of a platform.
+
+    Attributes
+    ----------
+    own : list of DeclaredPhase
+        Phases of slow vibrations, and of declared random errors of sensors, clocks and the air. The displacements by
+        these errors have no sign, see `undirected_moves`.
+    phases : list of DeclaredPhase
+        Phases of all declared errors. They are errors of motion, errors of clocks, pure phase errors, and the errors
+        in `own`.
+    undirected_moves : list of (str, (east, north))
+        Displacements of the image by random errors and tones, whose displacements have no sign. [m] Each item is a
+        pair of row id and displacement. For a random error these are the sigmas of the displacement. For a tone, each
+        component is given for the phase of the tone at which it is largest. The displacement is 0 for a clock whose
+        displacement the mission file does not determine.
     """
 
     def __init__(
@@ -63,6 +76,10 @@ class Together:
         self.random = [error for error in random if not error.counted_in]
         self.rule = errors.mission.allocation.combine
         self.motion = [error for error in errors.stated if error.is_motion]
+        self.own = [*self._phases_of_slow(), *self._phases_of_random()]
+        self.phases = [*self._phases_of_stated(), *self.own]
+        self.undirected_moves = [*self._moves_of_random(), *self._moves_of_tones()]
+        self._hidden_of_groups = self._hidden_by_group()
 
     @property
     def rule_of_all(self) -> str:
@@ -72,21 +89,17 @@ class Together:
         """
         return "rss" if self.rule == "each" else self.rule
 
-    @cached_property
-    def own(self) -> list[DeclaredPhase]:
-        """Phases of slow vibrations, and of declared random errors of sensors, clocks and the air.
-
-        The displacements by these errors have no sign, see `undirected_moves`.
-        """
+    def _phases_of_slow(self) -> Iterator[DeclaredPhase]:
         array = self.errors.array
-        phases = [
-            vibration._replace(
+        for vibration in self.slow:
+            yield vibration._replace(
                 qpe_rad=array(vibration.qpe_rad),
                 cubic_rad=array(vibration.cubic_rad),
                 hidden_rad=array(vibration.hidden_rad),
             )
-            for vibration in self.slow
-        ]
+
+    def _phases_of_random(self) -> Iterator[DeclaredPhase]:
+        array = self.errors.array
         for error in self.random:
             if error.declared is not None:
                 effect, coverage = error.effect(self.model), error.coverage(self.errors.mission)
@@ -95,22 +108,15 @@ class Together:
                     for phase_part in (effect.quadratic, effect.cubic, effect.hidden)
                 )
                 phase = DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage)
-                phases.append(phase._replace(hidden_rad=hidden))
-        return phases
+                yield phase._replace(hidden_rad=hidden)
 
-    @cached_property
-    def phases(self) -> list[DeclaredPhase]:
-        """Phases of all declared errors.
-
-        They are errors of motion, errors of clocks, pure phase errors, and the errors in `own`.
-        """
-        phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
+    def _phases_of_stated(self) -> Iterator[DeclaredPhase]:
+        factor = self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
             cubic = does.cubic if error.is_motion else None
             phase = DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage)
-            phases_of_motion.append(phase._replace(hidden_rad=does.hidden))
-        return [*phases_of_motion, *self.own]
+            yield phase._replace(hidden_rad=does.hidden)
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """List the phases of the declared errors that count against an owner's share.
@@ -151,9 +157,8 @@ class Together:
         """
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
-    @cached_property
-    def _hidden_of_groups(self) -> dict[str, Any]:
-        """Combined hidden phase of the six errors of each covariance. [rad]
+    def _hidden_by_group(self) -> dict[str, Any]:
+        """Compute the combined hidden phase of the six errors of each covariance. [rad]
 
         The keys are the ids of the covariances. Autofocus does not correct hidden phases. In the published model they
         are 0."""
@@ -229,14 +234,7 @@ class Together:
         moves = [(row_id, (east, north)) for row_id, (east, north) in zip(does, (ahead - back) / 2, strict=True)]
         return [*moves, ("whatever the signs", (rest[0], rest[1]))] if rest.any() else moves
 
-    @cached_property
-    def undirected_moves(self) -> Moves:
-        """Displacements of the image by random errors and tones, whose displacements have no sign. [m]
-
-        Each item is a pair of row id and (east, north). For a random error these are the sigmas of the displacement.
-        For a tone, each component is given for the phase of the tone at which it is largest. The displacement is 0
-        for a clock whose displacement the mission file does not determine.
-        """
+    def _moves_of_random(self) -> Moves:
         moves = []
         for error in self.random:
             if error.declared is not None:
@@ -245,6 +243,10 @@ class Together:
                 moved = (self.errors.array(component * error.declared) for component in effect[3:5])
                 east, north = (np.where(is_open, 0.0, component) for component in moved)
                 moves.append((error.subject.id, (east, north)))
+        return moves
+
+    def _moves_of_tones(self) -> Moves:
+        moves = []
         for tone in self.tones:
             east, north = map(self.errors.array, tone.by(self.model))
             moves.append((tone.subject.id, (east, north)))

@@ -498,7 +498,7 @@ class JudgedScene:
     analysis: Analysis
     edges: SceneEdges | None
 
-    @cached_property
+    @cached_property  # a slow search, which sweeps do not need
     def corrections(self) -> Corrections | None:
         """Distance from the scene centre up to which one autofocus correction is sufficient; None without errors.
 

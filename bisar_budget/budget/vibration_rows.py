@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,6 +68,9 @@ class Vibrations:
             name: self._columns([line.per_metre for line in lines_of_platform])
             for name, lines_of_platform in lines.items()
         }
+        # Groups of neighbouring lines, each with the amplitude [m] of a single line that has an equally high echo.
+        self._near = {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
+        self._both = self._of_both_platforms()
 
     def _columns(self, numbers: Sequence[PerCase]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
@@ -229,21 +231,12 @@ class Vibrations:
             is_there = np.asarray(members.any(axis=0))
             yield self._row(model, row_subject, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
-    @cached_property
-    def _near(self) -> dict[str, list[tuple[Booleans, Floats]]]:
-        """Groups of neighbouring lines, by platform, with the amplitude [m] of an equivalent line for each group.
+    def _of_both_platforms(self) -> dict[str, Floats]:
+        """Compute the peak phases [rad] of single lines that replace groups of neighbouring lines of both platforms.
 
-        The equivalent line is a single line whose echo is as high as that of the group.
-        """
-        return {name: list(_together(self.amplitudes[name], self.cycles[name])) for name in PLATFORMS}
-
-    @cached_property
-    def _both(self) -> dict[str, Floats]:
-        """Peak phase [rad] of a single line with the same echo as a group of neighbouring lines of both platforms.
-
-        The echoes of the group add with their worst starting phases. The value is given for each line of each
-        platform, (lines, cases). It is NaN without a neighbouring line of the other platform, without an amplitude,
-        or without a required PSLR.
+        A single line has the same echo as its group, whose echoes add with their worst starting phases. The value is
+        given for each line of each platform, (lines, cases). It is NaN without a neighbouring line of the other
+        platform, without an amplitude, or without a required PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
