@@ -1,4 +1,4 @@
-"""Run the `bisar-budget` command by `python -m bisar_budget`."""
+"""Entry point of `python -m bisar_budget`, which runs the `bisar-budget` command."""
 
 from bisar_budget.cli import main
 

@@ -1,4 +1,4 @@
-"""Types of arrays, and of values that are a number for one case or an array for many."""
+"""Type aliases for arrays, and for values that are a number (one case) or an array (many cases)."""
 
 from typing import Any
 

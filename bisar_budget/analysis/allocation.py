@@ -1,6 +1,7 @@
 """Division of a mission's budgets between transmitter, receiver and clock, and the gain that autofocus adds.
 
-The module also gives upper bounds on N_pull, which sets this gain.
+The gain depends on N_pull, the pull-in range of autofocus in units of π rad. The module also gives upper bounds on
+N_pull.
 """
 
 import math
@@ -67,12 +68,12 @@ class Allocation(NamedTuple):
         return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
-        """Note on the smallest N_pull with which an owner's phase error would pass, or on why no N_pull is enough.
+        """Write a note with the smallest N_pull for which a phase error passes, or with the reason why it fails.
 
         `qpe` is the quadratic phase at the aperture edge, which autofocus corrects. [rad] `hidden` is the quadratic
         phase that would cause the same peak loss as the errors that autofocus does not correct. [rad] The judged
-        phase is the root-sum-square of `qpe` and of `hidden` times the autofocus gain. No N_pull is therefore enough
-        if `hidden` reaches the owner's limit without autofocus.
+        phase is the root-sum-square of `qpe` and of `hidden` times the autofocus gain. Therefore the phase error
+        fails for any N_pull if `hidden` reaches the owner's limit without autofocus.
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -176,16 +177,16 @@ class Caps(NamedTuple):
     `walk` is f₀/B. A larger N_pull is reduced to `walk`. `scene` is None if the mission file gives no size of the
     scene. If N_pull exceeds `scene`, the report contains a warning.
 
-    A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ range cells. It smears a
-    point over 4N cross-range cells. The bounds were measured on images of points
+    A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ range cells. Such a
+    phase smears a point target over 4N cross-range cells. The bounds were measured on images of point targets
     (`tests/simulate/test_pull_in_caps.py`). One-dimensional autofocus still works for a range walk of half a cell or
     more. However, no phase correction recovers the loss that range walk causes. The loss is 0.6 dB for a range walk
     of half a cell and 1.3 dB for a whole cell.
 
-    Autofocus also fails if the image patch on which it works is too small, at any range walk and bandwidth. The image
-    then stays smeared. Phase gradient autofocus needs a patch three times as wide as the smear, and map drift
-    autofocus needs a patch 1.5 times as wide. This was found for range walks of a hundredth of a cell and of a third
-    of a cell.
+    Autofocus also fails, and leaves the image smeared, if it works on too small a patch of the image. This does not
+    depend on range walk or bandwidth. Phase gradient autofocus needs a patch three times as wide as the smear, and
+    map drift autofocus needs a patch 1.5 times as wide. This was found for range walks of a hundredth of a cell and
+    of a third of a cell.
     """
 
     walk: float
@@ -218,7 +219,7 @@ def effective_n_pull(mission: Mission) -> float | None:
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Note on the N_pull with which an error would pass, or on the upper bound that this N_pull exceeds.
+    """Write a note with the N_pull that an error needs to pass, or with the upper bound that this N_pull exceeds.
 
     Parameters
     ----------

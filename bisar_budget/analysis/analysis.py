@@ -1,4 +1,4 @@
-"""Analysis on which all checks of a mission rely: its geometry, its errors, and their effects in both models.
+"""Analysis of a mission for the checks: its geometry, its errors, and their effects in the two models.
 
 A case is a mission with definite numbers. Cases whose mission files have the same structure are analysed together, in
 arrays (cases,). `Case` gives the plain numbers of a single case for the text of a report.
@@ -80,10 +80,10 @@ class Analysis:
     exact : ExactRanges
         Exact range histories of all cases at the nodes of the aperture.
     errors : DeclaredErrors
-        Declared errors and the errors of the rows in `shown`, with their effects. Without `shown` they are all errors
-        that the cases can have.
+        Declared errors and the errors of the rows in `shown`, with their effects. If `shown` is omitted, these are
+        all errors that the cases can have.
     random : list of RandomError
-        Errors of the sensors, clocks and air that the mission file describes. The list may be empty.
+        Errors of sensors, clocks and the air, as described in the mission file. The list may be empty.
     tones : list of Tone
         Tones that make paired echoes. They are vibrations of at least one cycle per aperture, tones of vibrating
         oscillators, and spurs.
@@ -103,12 +103,13 @@ class Analysis:
         the direct path. The full model follows from exact ranges.
     allocation : Allocation
         Budgets of the cases, divided between transmitter, receiver and clock. The split `balanced` divides in
-        proportion to the phases in the gating model. Under `strictest` it uses the larger phase of both models.
+        proportion to the phases in the gating model. Under `strictest` it uses the larger of the phases in the two
+        models.
     noise : dict of str to list of SpreadPhase
-        Phase errors by noise, see `spread.noise`. The keys are the names of the models.
+        Phase errors due to noise, see `spread.noise`. The keys are the names of the models.
     rests : dict of str to list of SpreadPhase
-        Parts of the phases of declared errors beyond the cubic order, see `spread.rests`. The keys are the names of
-        the models. The published model has no such parts.
+        For each declared error, the part of its phase beyond the cubic order, see `spread.rests`. The keys are the
+        names of the models. The published model has no such parts.
     resolution : Resolution
         Widths of the error-free impulse response, as arrays (cases,).
     """
@@ -155,7 +156,7 @@ class Analysis:
             self.resolution = resolution(self.exact, self.geometry, mission.radar, mission.collection.aperture_time)
 
     def together(self, model: str) -> Together:
-        """Return the declared errors and their combination in the model of the given name."""
+        """Return the declared errors and their combination according to `model`, `published` or `full`."""
         return self._together[model]
 
     def models(self, gating: str) -> tuple[Model, Model]:
@@ -216,14 +217,15 @@ class Case:
         return plain(column, self.place)
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
-        """Return the phases and the displacement that a declared error causes in this case, according to a model."""
+        """Return the phases and the displacement that a model gives for a declared error in this case."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
-        """Displacement of the image, east and north, by the tone of a row in the model of the given name. [m]
+        """Displacement of the image, east and north, that a model gives for the tone of a row. [m]
 
-        Each component is given for the phase of the tone at which it is largest. The result is None if the row has no
-        tone, or if the model determines no displacement, for example where Q has no inverse.
+        Each component is given for the phase of the tone at which it is largest. `model` is `published` or `full`.
+        The result is None if the row has no tone, or if the model gives no displacement, for example because the
+        matrix Q is singular.
         """
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:

@@ -3,9 +3,9 @@
 An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps the
 fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band. The mean over the aperture is
 computed as a sum over its nodes. With a random error whose phase has the variance σ², the peak keeps the fraction
-exp(-σ²) of its power. The same holds for a tone of unknown phase. Losses of independent errors add in decibels,
-because the variances of their phases add to second order. Derived here. `tests/theory/test_image_point.py` checks it
-against images formed by direct sums.
+exp(-σ²) of its power. The same holds for a tone of unknown phase. The losses of independent errors in decibels are
+added, because the variances of their phases add (to second order). Derived here. `tests/theory/test_image_point.py`
+checks it against images formed by direct sums.
 """
 
 import math
@@ -67,7 +67,7 @@ def peak_loss_db(
 
 
 def _losses_of_motion(errors: DeclaredErrors, together: Together) -> list[Floats]:
-    """List the peak loss due to each error of motion or of a clock, for the worse sign of the error, (cases,). [dB]
+    """List the peak loss due to each motion or clock error, (cases,), taken for the worse sign of the error. [dB]
 
     Under root-sum-square the six correlated errors of a covariance are replaced by six independent errors that
     together have the same covariance.

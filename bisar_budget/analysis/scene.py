@@ -129,10 +129,10 @@ class ScenePlaces:
     `phases` (errors and parts, places) are the quadratic phases. [rad] `size` (places,) is the difference between the
     phases at the place and at the centre, combined over all errors by the mission's rule. [rad]
 
-    `clearance` (places,) tells whether a place has an image, which is the case above 1. It is the sine of the angle
-    between the directions that band and aperture resolve, divided by the smallest sine that gives an image. The
-    clearance is positive at the centre. It is negative if the two directions are parallel at some point between the
-    centre and the place. It is 0 at a place that almost coincides with a platform.
+    A place has an image if its `clearance` (places,) exceeds 1. The clearance is the sine of the angle between the
+    directions that band and aperture resolve, divided by the smallest sine that gives an image. It is positive at the
+    centre. It is negative if the two directions are parallel at some point between the centre and the place. It is 0
+    at a place that almost coincides with a platform.
     """
 
     phases: Floats
@@ -155,7 +155,7 @@ class ScenePlaces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rims:
-    """Largest phase differences between the points of circles and the scene centre, and their azimuths. [rad]
+    """Largest phase difference from the scene centre on each of several circles, with its azimuth. [rad]
 
     `difference` is the largest difference on each circle, and `azimuth` is where it occurs, (circles,) each. Both are
     computed as if all errors were small. If a part of a circle has no image, its difference is infinite. `phases`
@@ -290,7 +290,7 @@ class ScenePhases:
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
-        """Phase of each error or part at ground points minus its phase at the scene centre. [rad]
+        """Phase difference of each error or part between ground points and the scene centre. [rad]
 
         The result is (errors and parts, places). The places are given by radius [m] and azimuth [rad] from the
         centre. For a large error, whose effects are not proportional to its size, the result is the exact difference
@@ -299,16 +299,16 @@ class ScenePhases:
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """Compute phase differences between ground points and the scene centre, and ratios that show a lost image.
+        """Compute phase differences between ground points and the scene centre, and ratios that reveal a lost image.
 
-        Returns three arrays. The first is (errors and parts, places) and holds the first-order phase differences.
-        [rad] The second has the same shape. In it, the differences of the errors marked in `exact` follow from exact
-        ranges. [rad] `exact` is (errors and parts, places).
+        Returns three arrays. The first, (errors and parts, places), holds the first-order phase differences. [rad]
+        The second, of the same shape, holds the same values, except that the differences of the errors marked in
+        `exact` are computed from exact ranges. [rad] `exact` is (errors and parts, places).
 
-        The third array is (places,) and holds the smallest area ratio of all errors marked in `exact`. The area ratio
-        of an error is the area that the range and Doppler gradients span with the error, divided by the area that
-        they span without it. With the error, it is the area at the point to which the error moves the image. The
-        ratio is 0 where there is no image. It is infinite where no error is marked.
+        The third array, (places,), holds the smallest area ratio among the errors marked in `exact`. For each error,
+        the area ratio compares the areas spanned by the range and Doppler gradients with and without the error: it is
+        the area with the error, at the point to which the error moves the image, divided by the area without the
+        error. The ratio is 0 where there is no image. It is infinite where no error is marked.
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
@@ -322,10 +322,11 @@ class ScenePhases:
     def _exactly(
         self, there: ExactRanges, of: Indices, error: Indices, point: Indices, kept: tuple[Floats, Floats]
     ) -> None:
-        """Replace phase differences by the results of exact ranges, for given pairs of error and place.
+        """Replace first-order phase differences by exact differences, for given pairs of error and place.
 
         `kept` holds the phase differences and the smallest area ratios of `around`, and both are updated in place.
-        `error` and `point` hold the indices of the error and of the place of each pair."""
+        `error` and `point` hold the indices of the error and of the place of each pair.
+        """
         (differences, turns), case, count = kept, of[point], error.size
         lanes = self._lanes.of((self._rows[:, error] * self.errors.cases + case).reshape(-1))
         lanes = replace(lanes, case=np.tile(point, 2))
@@ -340,7 +341,7 @@ class ScenePhases:
         worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
         differences[error, point] = np.copysign(worst, differences[error, point])
 
-    # The following are cached, because only scenes with a large error need them, and they follow exact ranges.
+    # The next three are cached: only scenes with a large error need them, and they follow exact ranges.
     @cached_property
     def _rows(self) -> Indices:
         """Index of the block of lanes in `_lanes` for each sign of each large error, (2, errors and parts).
@@ -373,12 +374,12 @@ class ScenePhases:
             phases[:, i] = self.errors.quadratic_by_sign(self.members[i])
         return phases
 
-    @cached_property
+    @cached_property  # not needed for single points, nor where a part of the edge has no image
     def more(self) -> Floats:
         """Exact quadratic phase at the scene centre minus the first-order phase, (errors and parts, cases). [rad]
 
-        The exact phase is that for the worse sign of the error. The value is 0 for an error that is not large.
-        An error is large if its effects are not proportional to its size.
+        The exact phase is taken for the worse sign of the error. The value is 0 for an error that is not large. An
+        error is large if its effects are not proportional to its size.
         """
         exactly = self.centre.copy()
         for index, error in enumerate(self.members):
@@ -446,8 +447,8 @@ def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[H
 
     A search starts from each point whose value is at least as high as at both neighbours. Clearances that are not
     expected to fall below `narrow_clearance_ratio` are left out. Sizes are left out if they are expected to stay
-    below the highest size, or if a point of their circle has no image. All minima of the clearance that remain are
-    searched, because the lowest minimum of the circle may be next to a point that is not the lowest.
+    below the highest size, or if a point of their circle has no image. All remaining minima of the clearance are
+    searched, because the lowest minimum of a circle need not be next to the lowest of its points.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
@@ -478,10 +479,10 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
     """Search for the maximum near each starting point on a circle.
 
     `start` holds the values and azimuths of the starting points. `sides` are the values at an angle `arc` [rad] on
-    both sides of each starting point, and they are not higher. `height_at` computes values at given azimuths. To
-    first order in the radius, a value is a constant plus a cosine of the azimuth. The search predicts the crest of
-    this cosine. If the value computed there differs from the prediction, the search is repeated in a quarter of the
-    arc.
+    both sides of each starting point. They do not exceed the value at the starting point. `height_at` computes values
+    at given azimuths. To first order in the radius, a value is a constant plus a cosine of the azimuth. The search
+    predicts the crest of this cosine. If the value computed there differs from the prediction, the search is repeated
+    in a quarter of the arc.
     """
     best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(_SCENE.max_climb_rounds):
@@ -544,7 +545,8 @@ class _Climb:
         """Mark the large errors whose exact phase differences on a circle deviate from the first-order differences.
 
         The result is (errors and parts, circles). An error is large if its effects are not proportional to its size.
-        The differences are compared at three azimuths, which suffice to detect two harmonics over the azimuth.
+        The differences are compared at three azimuths. These suffice to detect a deviation that consists of two
+        harmonics of the azimuth.
         """
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
@@ -611,7 +613,7 @@ class _Climb:
 def differences_at(
     errors: DeclaredErrors, radius: float, azimuth: float, random: Sequence[RandomError] = ()
 ) -> list[tuple[str, float]]:
-    """List the quadratic phase of each error at a ground point minus its phase at the scene centre. [rad]
+    """List, for each error, the quadratic phase at a ground point minus the phase at the scene centre. [rad]
 
     Each item is a pair of row id and phase difference. `errors` must have a single case. The ground point is given by
     its radius [m] and azimuth [rad] from the scene centre. Errors of motion and clocks come first, then random
@@ -738,10 +740,11 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 
 
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
-    """Combined phases at the scene's edge that exceed limits which they meet at the centre. [rad]
+    """Combined phases that exceed their limits at the scene's edge but not at the centre. [rad]
 
-    The result is (names, cases in `of`). It is 0 where the phase meets its limit at the edge, or exceeds it at the
-    centre already. `members` holds, for each name, the indices of the errors that its phase combines.
+    The result is (names, n), for the n cases in `of`. An element is 0 if the phase meets its limit at the edge, or
+    exceeds it already at the centre. `members` holds, for each name, the indices of the errors that its phase
+    combines.
     """
     phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
@@ -783,7 +786,7 @@ class Corrections:
 
     @cached_property  # a slow search, which a case without an image at the edge does not need
     def served(self) -> Floats:
-        """Radius up to which a single autofocus correction is sufficient, (cases,). [m]
+        """Radius around the scene centre up to which a single autofocus correction is sufficient, (cases,). [m]
 
         At this radius the largest phase difference from the centre reaches the budget `total`. The radius is infinite
         if the difference stays within the budget up to `farthest`. It is NaN if a part of the scene's edge has no
@@ -817,7 +820,7 @@ class Corrections:
         return radii
 
     def _served_of_small(self, of: Indices) -> Floats:
-        """Find the radii of `served` under the assumption that the effects of all errors are of first order. [m]
+        """Find the radii that `served` returns, with the effects of all errors taken to first order. [m]
 
         The search runs along the worst azimuth at the scene's edge. It is repeated if the circle with the radius
         found has a worse azimuth. After `max_azimuth_rounds` searches, the whole circle is evaluated at each radius.
@@ -958,7 +961,7 @@ class SceneEdge(NamedTuple):
     def of(cls, corrections: Corrections, mission: Mission, case: int = 0) -> "SceneEdge":
         """Create the scene edge of one case from the results for many cases.
 
-        `mission` is the mission of this case, and `case` its index in `corrections`.
+        `mission` is the mission of this case, and `case` is the index of the case in `corrections`.
         """
         edges = corrections.edges
         (size, rim), (difference, azimuth) = (map(float, heights.of(case)) for heights in (edges.rim, edges.largest))
@@ -999,9 +1002,9 @@ class SceneEdge(NamedTuple):
 
 
 def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
-    """Reason why a ground point has no image, as text.
+    """Text with the reason why a ground point has no image.
 
-    `ground_point` is given east and north of the scene centre. [m]
+    `ground_point` is the point's position (east, north) relative to the scene centre. [m]
     """
     (east, north), geometry = ground_point, mission.geometry
     transmitter, receiver = (

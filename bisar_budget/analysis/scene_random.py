@@ -15,8 +15,9 @@ be too small.
 - A zenith delay is the same for the whole scene, but the elevation of a platform depends on the ground point. A delay
   that changes within the aperture consists of as many independent parts as its correlation requires.
 - A slow vibration has an unknown phase. Its cosine and its sine are two parts of the same size. The effect in the
-  worst phase is the root-sum-square of the effects of both. The axes may vibrate in any phase, so their effects add.
-  A vibration stated along the line of sight moves the platform along the line of sight to the scene centre.
+  worst phase is the root-sum-square of the effects of these two parts. The axes may vibrate with any phase relative
+  to each other, so their effects add. A vibration stated along the line of sight moves the platform along the line of
+  sight to the scene centre.
 
 An error that the mission file states only by its effect has this effect at every ground point. Derived here.
 `tests/simulate/test_random_at_scene_edge.py` checks it against exact ranges.
@@ -77,14 +78,15 @@ class RandomPhases:
         self._first_rows, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phases at ground points (places) due to the parts of all errors, (parts, places). [rad]
+        """Quadratic phase at each ground point due to each part of each error, (parts, places). [rad]
 
-        The argument `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
+        The argument `there` gives the exact ranges at the ground points (places). `of` holds the index of the case
+        for each ground point.
         """
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Combine the phases of the parts of each error to the phase of the error. [rad]
+        """Combine the phases of the parts of each error into the phase of the error. [rad]
 
         `phases` is (parts, ...), and the result is (errors, ...).
         """
@@ -108,10 +110,11 @@ class _Moving(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase at ground points (places) due to each part of the error, (parts, places). [rad]
+        """Quadratic phase at each ground point due to each part of the error, (parts, places). [rad]
 
         A part is a motion along a single direction with a single variation over the aperture. `there` gives the exact
-        ranges at the places. `of` holds the index of the case for each place."""
+        ranges at the ground points (places). `of` holds the index of the case for each ground point.
+        """
         weights, (total, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
         for motion in self.moves:
             ways, courses = _of(motion.ways, of), _of(motion.courses, of)
@@ -155,9 +158,10 @@ class _Clock(NamedTuple):
         return cls(quadratic, constant, linear, _terms(exact.phase_weights, exact)[0])
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase at ground points (places) due to each part of the clock error, (parts, places). [rad]
+        """Quadratic phase at each ground point due to each part of the clock error, (parts, places). [rad]
 
-        `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
+        `there` gives the exact ranges at the ground points (places). `of` holds the index of the case for each ground
+        point.
         """
         by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
         quadratic, constant, linear = (term[:, of] for term in self[:3])
@@ -190,9 +194,10 @@ class _Delay(NamedTuple):
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Indices) -> Floats:
-        """Quadratic phase at ground points (places) due to each variation in `courses`, (courses, places). [rad]
+        """Quadratic phase at each ground point due to each variation in `courses`, (courses, places). [rad]
 
-        `there` gives the exact ranges at the places. `of` holds the index of the case for each place.
+        `there` gives the exact ranges at the ground points (places). `of` holds the index of the case for each ground
+        point.
         """
         along = np.zeros(())
         for platform_index, middle in zip(self.platform_indices, self.middles, strict=True):

@@ -6,9 +6,9 @@ against its own requirement. If there is no such requirement, its power counts a
 sidelobes.
 
 Noise with the phase variance σ² leaves the fraction exp(-σ²) of the energy in the impulse response, and spreads the
-remaining energy over the image. The fraction E of the response's energy lies within the first nulls, which are taken
-as the limits of the mainlobe in an image. Noise therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule adds σ²
-instead.
+remaining energy over the image. In an image, the mainlobe is taken to extend to the first nulls of the response. It
+contains the fraction E of the response's energy. Noise therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule
+adds σ² instead.
 """
 
 import math
@@ -42,7 +42,8 @@ class Tone(NamedTuple):
     """Sinusoidal phase error due to a platform's vibration, an oscillator's spur, or an oscillator's vibration.
 
     `phase` is the peak phase [rad], and `cycles` is the number of cycles per aperture. `in_quadrature` is the row id
-    of a second tone that is shifted by a quarter cycle against this tone. If it is None, the tone may have any phase.
+    of a second tone that is shifted by a quarter cycle relative to this tone. If it is None, the tone may have any
+    phase.
     """
 
     subject: Subject
@@ -55,8 +56,9 @@ class Tone(NamedTuple):
 class SpreadPhase(NamedTuple):
     """Phase error that spreads energy over the image, with its variance [rad²] and the id of its row.
 
-    The error counts against the share that its owner has of the ISLR. The owner is a platform, the clock or the
-    mission."""
+    The error counts against its owner's share of the ISLR requirement. The owner is a platform, the clock or the
+    mission.
+    """
 
     row_id: str
     owner: str
@@ -64,7 +66,7 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """Error that was determined elsewhere and that the mission file states by the ISLR that it adds. [dB]"""
+    """Error that was determined elsewhere, stated in the mission file as a contribution to the ISLR. [dB]"""
 
     subject: Subject
     islr: Any
@@ -80,7 +82,7 @@ class StatedPower(NamedTuple):
 def mainlobe_energy(mission: Mission) -> float:
     """Fraction E of the impulse response's energy that lies within the first nulls.
 
-    It is that of an error-free response with the window that the mission states for image formation.
+    The response is error-free and uses the window that the mission states for image formation.
     """
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
 
@@ -168,7 +170,7 @@ def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[To
 
 
 def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """List the tones that an oscillator's tone becomes after synchronization, as far as they make echoes.
+    """List the tones that remain of an oscillator's tone after synchronization and make echoes.
 
     `alone` is the oscillator's tone, represented by a single tone. If synchronization does not fold it, the list has
     only this tone. If synchronization folds it to several frequencies, the list has a tone for each of them. Without
@@ -191,7 +193,7 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
 def noise(
     mission: Mission, geometry: BistaticGeometry, random: Iterable[RandomError], model: str
 ) -> list[SpreadPhase]:
-    """List the phase errors by noise, which spread energy over the image, with their variances. [rad²]
+    """List the phase errors due to noise, which spread energy over the image, with their variances. [rad²]
 
     Their origins are wideband vibration, the random errors `random`, and ISLR contributions that the mission file
     states. Random errors are sensor noise, phase noise and synchronization links.
@@ -218,7 +220,7 @@ def rests(
     slow: Iterable[DeclaredPhase],
     slow_tones: Mapping[str, SlowTone],
 ) -> list[SpreadPhase]:
-    """List the parts beyond the cubic order of the phases that errors cause, with their variances. [rad²]
+    """List, for each error, the part of its phase beyond the cubic order, with the variance of this part. [rad²]
 
     The errors are errors of motion, clocks and sensors, and slow vibrations. The variances are at one sigma, without
     coverage factor. Negligible phases are left out. The phases are very small for short apertures, and larger for an
@@ -259,7 +261,7 @@ def rests(
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List the errors that were determined elsewhere and that the mission file states by the ISLR that they add."""
+    """List the errors determined elsewhere, which the mission file states as contributions to the ISLR."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -270,11 +272,11 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
     """List, for each owner, the phase errors that count against its share of the ISLR.
 
-    For the owner `mission`, these are the phase errors of all owners. They are noise, and the parts of phases beyond
-    the cubic order. Tones are included if there is no requirement on PSLR. The cubic phase is included if it has no
-    requirement of its own. It combines the errors of the owner at one sigma. It is left out where it is negligible,
-    or where an error is so large that no image is left. A variance [rad²] is NaN in the cases in which the phase
-    error is left out or does not occur.
+    For the owner `mission`, these are the phase errors of all owners. The phase errors are noise, and the parts of
+    phases beyond the cubic order. Tones are included if there is no requirement on PSLR. The cubic phase is included
+    if it has no requirement of its own. This cubic phase combines the errors of the owner at one sigma. It is left
+    out where it is negligible, or where an error is so large that there is no image. A variance [rad²] is NaN in the
+    cases in which the phase error is left out or does not occur.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = analysis.noise[model] + analysis.rests[model]

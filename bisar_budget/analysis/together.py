@@ -31,7 +31,7 @@ from bisar_budget.mission.model import Shares
 class Together:
     """Single and combined effects of the declared errors in one model, for many cases.
 
-    The errors are those along the axes in which the mission file states them.
+    The errors are given along the axes in which the mission file states them.
 
     Parameters
     ----------
@@ -129,10 +129,10 @@ class Together:
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
         """List the judged phases that a rule combines, as pairs of id and phase. [rad]
 
-        The judged phase is the quadratic phase and `gain` times the hidden phase, as a root-sum-square. Autofocus
-        does not correct the hidden phase. `rule` and the autofocus gain `gain` are the values of the mission if they
-        are not given. Under root-sum-square the six phases of a covariance are combined to a single phase, according
-        to their correlations.
+        The judged phase is the root-sum-square of the quadratic phase and `gain` times the hidden phase. Autofocus
+        does not correct the hidden phase. If `rule` or the autofocus gain `gain` is not given, the mission's value is
+        used. Under root-sum-square the six phases of a covariance are combined to a single phase, according to their
+        correlations.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
         row_ids = [member.row_id for member in members]
@@ -152,8 +152,7 @@ class Together:
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Floats:
         """Combine the judged phases of the given errors, (cases,). [rad]
 
-        `rule` and `gain` are the values of the mission if they are not given. See `judged_parts` for the judged
-        phase.
+        If `rule` or `gain` is not given, the mission's value is used. See `judged_parts` for the judged phase.
         """
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
@@ -181,7 +180,7 @@ class Together:
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
-        """Range errors of six independent errors that together have the covariance of six correlated errors. [m]
+        """Range errors due to six independent errors that together have the covariance of six correlated errors. [m]
 
         The result is (6, nodes, cases). `remaining` are the range errors at the nodes due to the six correlated
         errors, (6, nodes, cases). [m] They are multiplied by a factor F of the correlation matrix C, with FFᵀ = C.

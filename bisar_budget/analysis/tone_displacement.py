@@ -11,8 +11,8 @@ times the rms displacement over all phases. It lies between the largest displace
 displacement. Derived here, to first order in the amplitude. `tests/analysis/test_tone_displacement.py` checks it
 against exact ranges for all phases.
 
-The axes of a vibration may vibrate in any phase, so their displacements add. The displacement decreases with the
-frequency of the tone, as 1/(fT).
+The vibrations along the axes may have any phase relative to each other, so their displacements add. The displacement
+decreases with the frequency of the tone, as 1/(fT).
 """
 
 import math
@@ -66,11 +66,11 @@ class ToneDisplacement(NamedTuple):
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """Return the parts of the tone in the model of the given name, `published` or `full`."""
+        """Return the parts of the tone according to `model`, `published` or `full`."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
-        """Displacement of the image east and north in the model of the given name, (2, n). [m]
+        """Displacement of the image east and north according to `model`, `published` or `full`, (2, n). [m]
 
         Each component is given for the phase of the tone at which it is largest. The displacements by all parts of
         the tone are added.
@@ -150,7 +150,7 @@ def _orders(cycles: PerCase, size: PerCase) -> Floats:
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
     """Displacement of the image, east and north, per metre of each Legendre order, according to (25). [m/m]
 
-    The result is (4, 2, n). It is 0 for orders 2 and 3. It is NaN for orders 0 and 1 where Q has no inverse.
+    The result is (4, 2, n). It is 0 for orders 2 and 3. For orders 0 and 1 it is NaN where the matrix Q is singular.
     """
     plane, _ = published_planes(geometry)
     displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))

@@ -55,7 +55,7 @@ class VibrationLimits(NamedTuple):
     def by(self, model: str) -> Any:
         """Return the limit according to a gating model, `published`, `full` or `strictest`. [m]
 
-        Under `strictest` it is the smaller of both limits.
+        Under `strictest` it is the smaller of the two limits.
         """
         return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
@@ -123,7 +123,7 @@ def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
-    """Find the highest paired echo that a single tone, or a group of tones with neighbouring frequencies, makes.
+    """Find the highest paired echo of a single tone, or of a group of tones with neighbouring frequencies.
 
     `shape` is the shape of the numbers in `tones`. It is (cases,), or () for plain numbers. The result is None if
     `tones` is empty. In a case without a tone, the level of the echo is 0.
@@ -225,13 +225,13 @@ def amplitude_share(split: Shares, name: str) -> PerCase:
 
 
 class SlowLimits(NamedTuple):
-    """Amplitudes along the line of sight at which a slow vibration reaches its limits of phase. [m]
+    """Amplitudes along the line of sight at which a slow vibration reaches its phase limits. [m]
 
     At the amplitude `quadratic` the vibration reaches the platform's limit of the quadratic phase. At the amplitude
     `cubic` it reaches the required cubic phase. `cubic` is None without a requirement on the cubic phase.
 
-    `quadratic_use` is the utilization of the limit of the quadratic phase by the declared vibration. `use` is the
-    larger of the utilizations of both limits.
+    `quadratic_use` is the fraction of the quadratic-phase limit that the declared vibration uses (its utilization).
+    `use` is the larger of the utilizations of the two limits.
     """
 
     quadratic: Floats

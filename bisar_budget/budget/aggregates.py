@@ -52,7 +52,7 @@ class Aggregates:
     def rows(self, model: str) -> Iterator["Aggregate"]:
         """Yield all rows for sums of errors under one gating model, in the order of the JSON output.
 
-        A row that passes by the gating model becomes a warning if it exceeds its limit by the other model.
+        A row that passes under the gating model becomes a warning if it exceeds its limit under the non-gating model.
         """
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
@@ -156,7 +156,7 @@ class Aggregates:
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
-        """Mark the cases, (cases,), in which at least one of the phases `members` is declared."""
+        """Return a mask of the cases in which any of the phases `members` is declared, (cases,)."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -181,7 +181,7 @@ class Aggregates:
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
 
-        A declared sum without a finite value fails, because one of its errors leaves the point without an image.
+        A declared sum without a finite value fails, because an error in it leaves no image of the point.
         `without_value` replaces the status `fail` of such a sum. `continued` is a pair: the kind of effect that the
         row sums, and the random errors in the sum. A pass becomes a warning if it depends on phase noise below the
         first point of a mask. A pass that depends on doubtful oscillator noise becomes `not_evaluated`.
@@ -226,9 +226,9 @@ class Aggregate(FamilyRow):
     """The budget row for one sum of errors, judged by one model, for an array of cases.
 
     `rule` names the rule that combines the `phases`. A row of displacements has no phases. `by_other` is the sum
-    computed by the model that does not gate. Under `combine: each` the row holds the largest error instead of a sum.
-    `of_all` is then the root-sum-square of all errors; otherwise it is NaN. A pass becomes a warning if `by_other` or
-    `of_all` exceeds the limit.
+    under the non-gating model. Under `combine: each` the row holds the largest error instead of a sum. `of_all` is
+    then the root-sum-square of all errors; otherwise it is NaN. A pass becomes a warning if `by_other` or `of_all`
+    exceeds the limit.
     """
 
     rule: str
@@ -262,7 +262,7 @@ class Aggregate(FamilyRow):
         return replace(self, judged=judged)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row for one case, including its text; `model` names the model that judges the row."""
         mission, row_subject = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
@@ -380,7 +380,7 @@ def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Booleans]:
-    """Find the random errors that displace the image by an unknown amount, such as clocks never set.
+    """Find the random errors that displace the image by an unknown amount, for example the errors of unset clocks.
 
     The result maps the row id of each random error to a mask of the cases in which the amount is unknown, (cases,).
     """
@@ -389,7 +389,7 @@ def unplaced(together: Together) -> dict[str, Booleans]:
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """Texts of a row that sums errors: the summed effect, its unit, the key of the file, and the equations."""
+    """Wording of the row for a sum of errors: the summed effect, its unit, the key of the file, and the equations."""
 
     what: str
     unit: str
@@ -465,8 +465,8 @@ def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Not
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
     """Explain why a pass becomes a warning; empty if it does not.
 
-    There are three possible reasons. All errors together exceed the limit, the sum by the model that does not gate
-    exceeds it, or the row depends on noise below the first point of a mask.
+    There are three possible reasons: all errors together exceed the limit, the sum under the non-gating model exceeds
+    it, or the row depends on noise below the first point of a mask.
     """
     if limit is None:
         return NOTHING
@@ -500,9 +500,9 @@ class JudgedScene:
 
     @cached_property  # a slow search, which sweeps do not need
     def corrections(self) -> Corrections | None:
-        """Distance from the scene centre up to which one autofocus correction is sufficient; None without errors.
+        """Distance from the scene centre up to which one autofocus correction suffices; None if there is no error.
 
-        The search for this distance is slow. It runs only when the texts of a row are written.
+        The search for this distance is slow. It runs only when the text of the row is written.
         """
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
@@ -541,7 +541,7 @@ class SceneRow(FamilyRow):
     scene: JudgedScene
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row for one case, including its text; `model` names the model that judges the row."""
         edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:

@@ -46,21 +46,21 @@ _CASES_AT_ONCE = 256  # arrays of more cases do not fit into the cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
-    """Check one mission as a single case, and return the findings with their texts.
+    """Check one mission as a single case, and return the findings, including their text.
 
     Parameters
     ----------
     mission : Mission
         Mission as loaded.
     today : date
-        Day on which waivers are judged, UTC.
+        Day (UTC) on which waivers are judged.
     outside : Outside
         Options, settings and environment variables that affect the verdict.
 
     Returns
     -------
     MissionFindings
-        Rows of declared and undeclared errors, in the order of the contract.
+        Findings with the rows of declared and undeclared errors, in the order of the JSON output.
     """
     analysis = Analysis(mission, is_complete=True)
     judged = judged_mission(analysis, today)
@@ -112,7 +112,7 @@ def _findings(
     outside: Outside,
     analysis: Analysis | None,
 ) -> MissionFindings:
-    """Collect the findings of one judged case, with their texts.
+    """Collect the findings for one judged case, including their text.
 
     `losses_db` are the losses of the image peak in all judged cases, see `peak_loss_db`. [dB]
     """
@@ -239,13 +239,13 @@ def check_files(
     files : sequence of str
         Names of mission files; `-` is standard input.
     today : date
-        Day on which waivers are judged, UTC.
+        Day (UTC) on which waivers are judged.
     model : str or None
-        Gating model that replaces the model of each file; None: each file's own model.
+        Gating model to use instead of the model that each file states. If None, each file's own model is used.
     keep : callable
         Function that reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
-        Arguments of a Monte Carlo; None: no draws.
+        Arguments of a Monte Carlo simulation. If None, there is no simulation.
     changes : sequence of SetValue
         Values that replace values of each file.
     outside : Outside
@@ -275,7 +275,7 @@ def check_files(
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
-    """Divide files into chunks whose files are checked together; many files give an even number of chunks.
+    """Divide files into chunks that are checked together. If there are many files, the number of chunks is even.
 
     The number of cores does not affect the division, because the last digits of a result depend on its chunk.
     """

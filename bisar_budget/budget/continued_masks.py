@@ -57,8 +57,8 @@ def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCa
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
     """Write a note that a row depends on phase noise below the first points of masks.
 
-    The note gives the fraction of the row's power that this noise makes up, and the frequency down to which the masks
-    should reach. It is empty if no declared error has such noise or if `size` is 0.
+    The note gives the fraction of the row's power that is due to this noise, and the frequency down to which the
+    masks should reach. It is empty if no declared error has such noise or if `size` is 0.
     """
     makers = [error for error in errors if error.continued is not None and error.declared is not None]
     if not makers or not size:

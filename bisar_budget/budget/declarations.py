@@ -29,8 +29,9 @@ DECLARATIONS = subject("mission", DECLARE)  # the row of all required declaratio
 class Missing(NamedTuple):
     """A required error that the file does not declare.
 
-    `owner` and `kind` are those of its budget rows, and `key` is the key to add to the file. If the file gives only
-    one of two entries that have an effect only together, `lacks` describes the missing entry.
+    `owner` and `kind` are the owner and the kind of its budget rows, and `key` is the key to add to the file. Some
+    errors need two entries to have any effect. If the file gives only one of them, `lacks` describes the missing
+    entry.
     """
 
     owner: str
@@ -51,7 +52,7 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    """Describe the attitude errors that the file lacks although it gives a lever arm; empty if it lacks none.
+    """Describe the attitude errors that are missing although the file gives a lever arm; empty if nothing is missing.
 
     A lever arm has an effect only if an attitude error rotates it. If the file gives the arm, an attitude error is
     therefore required too. A stated uncertainty of the arm does not replace the attitude error.
@@ -62,7 +63,7 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Describe what an oscillator lacks: the acceleration sensitivity or the vibration; empty if it lacks nothing.
+    """Describe the missing acceleration sensitivity or vibration of an oscillator; empty if nothing is missing.
 
     Vibration and acceleration sensitivity have an effect only together.
     """
@@ -83,16 +84,16 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty text, for kinds of error that consist of one entry and so cannot be half stated."""
+    """Return an empty string, for kinds of error that need a single entry and so can never be half stated."""
     return ""
 
 
 @dataclass(frozen=True)
 class _OfPlatform:
-    """A kind of error that each platform can have: its key below the platform, and tests of what the file states.
+    """A kind of error that each platform can have: its key under the platform, and tests of the mission file.
 
-    `lacks` returns a text with the missing key without which the stated error has no effect. The text is empty if
-    nothing is missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
+    `lacks` names a missing key without which the stated error has no effect; the result is empty if nothing is
+    missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
 
     If `is_owed` is not set, the kind counts as missing only if the file states a part of it. A platform that does not
     move must declare only the kinds with `is_owed_still`. A kind without `is_listed` counts as other kinds, for
@@ -212,9 +213,9 @@ def _registered(name: str) -> _OfPlatform:
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error that belongs to no single platform, and functions that test what the file states about it.
+    """A kind of error that belongs to no single platform, with functions that test for it in the mission file.
 
-    Such errors are those of the clocks and of the atmosphere, those that both platforms have in common, and errors
+    Such errors are errors of the clocks and of the atmosphere, errors that both platforms have in common, and errors
     with other causes.
     """
 
@@ -320,7 +321,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
 
 # ---------------------------------------------------------------------- declarations of a mission
 def declared_kinds(mission: Mission) -> DeclaredKinds:
-    """List the kinds of error that a mission declares, those that it should declare, and those without a source.
+    """List the kinds of error that a mission declares, fails to declare, or declares without stating a source.
 
     A covariance counts as position and velocity. If a direct path serves as the clock, timing errors and oscillators
     are not listed. The result also lists the spectra that the file raises or lowers by a level.

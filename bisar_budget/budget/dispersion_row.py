@@ -1,8 +1,8 @@
 """The row for dispersion: free electrons cause a quadratic phase over the band, which blurs the image in range.
 
-The requirement on the quadratic phase limits dispersion alone, because a phase over frequency does not add to phases
-over slow time. Dispersion may use the full requirement, because no share of it belongs to the atmosphere. Autofocus
-does not correct dispersion.
+Dispersion is compared with the requirement on the quadratic phase separately from all other errors, because a phase
+over frequency does not add to phases over slow time. Dispersion may use the full requirement, because no share of it
+belongs to the atmosphere. Autofocus does not correct dispersion.
 """
 
 from collections.abc import Iterator
@@ -43,7 +43,7 @@ class DispersionRow(FamilyRow):
     """The row for the quadratic phase [rad] over the band that free electrons cause, for an array of cases."""
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts. The row is the same for both models."""
+        """Build the report row for one case, including its text. The row is the same for both models."""
         propagation = case.mission.propagation
         assert propagation is not None  # else there is no row
         contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}

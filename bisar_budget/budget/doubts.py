@@ -2,7 +2,8 @@
 
 A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the orbital
 elements, the interpolation of the ephemeris, and the residual of the smoothed log. A declared position error smaller
-than this distance cannot be right. Nor can a declared error be right if the source of the path states a larger error.
+than this distance cannot be right. A declared error cannot be right either if the source of the path states a larger
+error.
 
 A log has two further errors. The residual is the difference between the fixes of the log and its smooth path. The
 rounding step is the step to which the fixes are rounded. A processor that uses the smooth path has neither error. A
@@ -49,8 +50,9 @@ class InputDoubt:
     are given along the axis on which `doubt` exceeds `declared` most, or as root-sum-squares if the doubt has no
     direction. The unit is that of `state`, the kind of the error. `note` gives both values in words.
 
-    If `is_of_log` is set, the doubt comes from a log. `doubt` is then one of two values. It is the phase of the log's
-    residual [rad], with the largest acceptable phase as `declared`, or the step to which the fixes are rounded [m].
+    If `is_of_log` is set, the doubt comes from a log. It then concerns either the log's residual or its rounding. For
+    the residual, `doubt` is the phase that it causes, and `declared` is the largest acceptable phase [rad]. For the
+    rounding, `doubt` is the step to which the fixes are rounded [m].
     """
 
     owner: str
@@ -63,7 +65,7 @@ class InputDoubt:
 
     @property
     def is_phase(self) -> bool:
-        """Whether the doubt is about the phase due to the residual of a log, and not about an error of the path."""
+        """Whether the doubt is about the phase that a log's residual causes, and not about an error of the path."""
         return self.state is None
 
     @property
@@ -107,7 +109,7 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind | None], Booleans]:
     """Find the cases in which the path of a platform may be less accurate than the file declares.
 
-    The result maps the name of the platform and the kind of error to a mask, (cases,). The kind None stands for the
+    The result maps the name of the platform and the kind of error to a mask, (cases,). The kind is None for the
     residual of a log.
     """
     doubted: dict[tuple[str, StateKind | None], Booleans] = {}
@@ -156,10 +158,11 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION_KIND) -> bool:
-    """Whether a row depends on one kind of path error of a platform, in the frame in which the file states it.
+    """Whether a row depends on one kind of path error of the platform `owner`.
 
-    A `state` of None stands for the residual of a log. The residual spreads power. The rows that depend on it are its
-    own row, and the rows that sum spread power for the platform and for the mission.
+    The row must refer to the frame in which the file states the error. A `state` of None stands for the residual of a
+    log. The residual spreads power. The rows that depend on it are its own row, and the rows that sum spread power
+    for the platform and for the mission.
     """
     if state is None:
         return row_subject in (residual_subject(owner), subject(owner, "islr"), subject("mission", "islr"))
@@ -205,7 +208,7 @@ def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platf
     """Covariance (..., 3, 3) of the stated errors along the scene's axes; None if the source does not state it.
 
     `state` is the kind of the errors, position [m²] or velocity [m²/s²]. If a platform is in free fall and the file
-    states its errors in the orbital frame `ric`, the velocity is relative to the stars.
+    states its errors in the orbital frame `ric`, the velocity is inertial.
     """
     covariance, row, fall = stated.covariance, 3 * state.order, platform.state.fall
     if covariance is None or len(covariance) <= row:
@@ -282,7 +285,7 @@ def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: State
 
 # ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether a log's residual is too large while the file does not state which path the processor uses."""
+    """Whether a log's residual is too large, and the file does not state which path the processor uses."""
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
@@ -335,8 +338,8 @@ def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     """Describe the doubt that the rounding step of a log's fixes causes.
 
-    The step and the declared position error are given along one axis. It is the axis on which the step exceeds the
-    permitted part of the declared position error most.
+    The step and the declared position error are given along the axis on which the step most exceeds the permitted
+    fraction of the declared position error.
     """
     assert platform.path is not None
     assert platform.path.log_noise is not None
@@ -465,8 +468,8 @@ def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
     case : Case
         The judged case.
     rows : sequence of Row
-        Judged rows. Only rows are examined that the published model judges and whose error the file states as
-        nonzero.
+        Judged rows. Only rows that are judged by the published model, and whose error is nonzero in the file, are
+        examined.
     """
     stated = {source.id for source in case.analysis.errors.stated if case.number(source.declared)}
     apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
@@ -508,9 +511,9 @@ def missing_settings(mission: Mission) -> list[str]:
 
 
 def collection_notes(case: Case, peak_loss_db: float | None) -> Iterator[Note]:
-    """Yield notes on assumptions of the models that a collection may violate, and on images with several peaks.
+    """Yield notes on model assumptions that a collection may violate, and on images with several peaks.
 
-    `peak_loss_db` is the loss of the image peak due to all declared errors. [dB] It is None if it is unknown.
+    `peak_loss_db` is the loss of the image peak due to all declared errors. [dB] It is None if the loss is unknown.
     """
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):

@@ -62,7 +62,7 @@ class ErrorRows:
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
         """Yield the rows of these errors under one gating model.
 
-        A row that passes by the gating model becomes a warning if the other model fails it.
+        A row that passes under the gating model becomes a warning if it fails under the non-gating model.
         """
         for block_index in range(len(self.errors.blocks)):
             yield from self._of_block(block_index, gating)
@@ -135,7 +135,7 @@ class ErrorRow(FamilyRow):
     limit: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
+        """Build the report row for one case, including its text; `gating` names the model that judges the row."""
         mission, row, source = case.mission, self.judged, self.source
         model, other_model = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
@@ -196,7 +196,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Write the reason why the model that does not gate fails the declared error; empty if that model passes it."""
+    """Explain why the declared error fails under the non-gating model; empty if it passes under that model."""
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -256,7 +256,7 @@ class SpecificationRow(FamilyRow):
     number: Number
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts. The row is the same for both models."""
+        """Build the report row for one case, including its text. The row is the same for both models."""
         return worded(
             case,
             self.judged,

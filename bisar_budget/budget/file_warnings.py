@@ -98,7 +98,7 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings of requirement ids for rows that do not exist, and of texts for ids that are never given."""
+    """Yield warnings about requirement ids for nonexistent rows, and about requirement texts for unknown ids."""
     if mission.requirement_ids:
         ids = [row.id for row in rows] + [id_of_requirement(key) for key in required_keys(mission)]
         unique_ids = set(ids)
@@ -114,7 +114,7 @@ def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _nearest(name: str, ids: Sequence[str]) -> str:
-    """Sentence with the known id nearest to an unknown one, to append to a sentence; empty without a similar one."""
+    """Hint with the most similar known id, to append to a sentence about an unknown id; empty if no id is similar."""
     hint = did_you_mean(name, tuple(ids))
     return hint and f". {hint}"
 
@@ -126,7 +126,7 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of paths that may be inaccurate, if no row already reports the doubt.
+    """Yield warnings about paths that may be inaccurate, unless a row already reports the doubt.
 
     Doubts about the position and about the residual of a log are treated separately.
     """
@@ -146,7 +146,7 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of logs whose noise changes the allowables noticeably, because the path is fitted to the log."""
+    """Yield a warning for each log whose noise, through the path fitted to it, noticeably changes the allowables."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -155,13 +155,15 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 
 
 def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of platforms that move like a satellite, but not in free fall.
+    """Yield warnings about platforms that move like a satellite, but not in free fall.
 
-    The warning gives the acceleration of free fall. A path without an acceleration is that of a satellite if it is as
-    fast as one, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a moves the true
-    path away from the straight path by aT²/8, for example 25 m in 5 s. Errors of any other path above 100 km that is
-    not in free fall are judged without the dynamics of an orbit. This gives a warning if these dynamics may change a
-    phase noticeably, or if errors are stated in `ric`, because their velocities then are not against the stars.
+    The warning gives the acceleration of free fall. A path without an acceleration counts as a satellite's path if it
+    is as fast as a satellite, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a
+    moves the true path away from the straight path by aT²/8, for example 25 m in 5 s.
+
+    On any other path above 100 km that is not in free fall, errors are judged without orbital dynamics. A warning is
+    given if these dynamics may change a phase noticeably, or if errors are stated in `ric`, because their velocities
+    are then not inertial.
     """
     noticeable = float(negligible_rad(mission))
     for name in PLATFORMS:
@@ -196,19 +198,20 @@ def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
 
 
 def _is_along_orbit(mission: Mission, platform: Platform) -> bool:
-    """Whether the file states errors of a platform in `ric`, whose velocities are inertial only in orbits."""
+    """Whether the file states errors of a platform in `ric`, where velocities are inertial only for orbits."""
     error, common = platform.motion_error, mission.common_motion_error
     is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
     return is_of_platform or (common is not None and common.frame == "ric")
 
 
 def _missing_phase(mission: Mission, platform: Platform, distance: float) -> float:
-    """Largest quadratic phase that the dynamics of an orbit may add to declared errors of a platform. [rad]
+    """Upper bound on the quadratic phase that orbital dynamics add to the declared errors of a platform. [rad]
 
     `distance` is the platform's distance from the Earth's centre. [m]
 
     Derived here. Relative to p + vτ, the gradient of gravity and the rotation of the Earth accelerate an error by at
-    most (2μ/r³ + ω²)|δr| + 2ω|δv|. A constant acceleration a over an aperture time T has the phase 2π/λ·aT²/8.
+    most (2μ/r³ + ω²)|δr| + 2ω|δv|. A constant acceleration a over an aperture time T causes the quadratic phase
+    2π/λ·aT²/8.
     """
     from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
 
@@ -227,7 +230,7 @@ def _missing_phase(mission: Mission, platform: Platform, distance: float) -> flo
 
 # ---------------------------------------------------------------------- how errors are stated
 def _of_instruments(case: Case) -> Iterator[_Warned]:
-    """Yield warnings about synchronisation, and warnings of errors that are stated twice.
+    """Yield warnings about synchronisation and about errors that are stated twice.
 
     The warnings about synchronisation concern pulses that are exchanged less than once per aperture, and clock errors
     that the file does not give.
@@ -245,7 +248,7 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
 
 
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of lever arms for which the file states no attitude error that would rotate them."""
+    """Yield warnings about lever arms for which the file states no attitude error that would rotate them."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
             key = ("platforms", name, "motion_error", "lever_arm", "arm")
@@ -262,14 +265,14 @@ def calm_oscillators(mission: Mission) -> list[str]:
 
 
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of acceleration sensitivities of oscillators that neither vibrate nor rotate."""
+    """Yield warnings about oscillators that are sensitive to acceleration but neither vibrate nor rotate."""
     for name in calm_oscillators(mission):
         key = ("platforms", name, "oscillator", _SENSITIVITY)
         yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings of doubtful oscillator noise that no row reports, since no requirement depends on it."""
+    """Yield warnings about doubtful oscillator noise that no row reports because no requirement depends on it."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
@@ -277,7 +280,7 @@ def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings of correlations between errors that have no effect, because `combine: each` forms no sums."""
+    """Yield warnings about error correlations that have no effect because `combine: each` forms no sums."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
@@ -289,7 +292,7 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- autofocus
 def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
-    """Yield warnings of an `autofocus.n_pull` that is larger than range walk or the size of the scene permits."""
+    """Yield warnings about an `autofocus.n_pull` that exceeds the bound set by range walk or by the scene size."""
     n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
     if n_pull is None:
         return

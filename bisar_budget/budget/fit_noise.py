@@ -27,7 +27,7 @@ _DECISIVE_EFFECT_FRACTION = (
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable that changes most due to the noise of the log to which a platform's path is fitted.
+    """The allowable most affected by the noise of the log to which a platform's path is fitted.
 
     `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
     [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the id of the row with the
@@ -86,8 +86,8 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 def _changes(units: Floats) -> Floats:
     """One sigma of the relative change of each allowable, (platforms, axes).
 
-    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error. Along `sides` come the path
-    itself, the path plus each mode of the fit's error, and the path minus each mode.
+    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error. The axis `sides` holds the path
+    itself, then the path plus each mode of the fit error, then the path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

@@ -21,7 +21,7 @@ _HOLD_CLOCKS = (*_HOLD_NOISE, "location_error")
 
 @dataclass(frozen=True)
 class HalfCause:
-    """A cause of error that needs two statements of the file, of which the file gives only one.
+    """A cause of error that two entries of the mission file describe, of which only one is given.
 
     Attributes
     ----------
@@ -73,10 +73,10 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
-    """Yield pairs of clocks for which the file states no oscillator, or only one of the two.
+    """Yield pairs of clocks for which the file does not state both oscillators.
 
     In holdover, both oscillators must be stated. If the clocks exchange pulses, a missing oscillator matters only if
-    the other one is stated.
+    the oscillator of the other platform is stated.
     """
     sync = mission.synchronization
     stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
@@ -103,7 +103,7 @@ def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
 def half_cause_of(mission: Mission, key: str) -> Note:
     """Name the key to add if a requirement depends on a cause of which the file states only one half.
 
-    The note is empty if the requirement depends on no such cause.
+    The note is empty if the requirement does not depend on such a cause.
     """
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

@@ -1,7 +1,7 @@
 """Judges all rows and requirements of a mission, for an array of cases. The check of one mission is a single case.
 
-Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Then follow the
-judgements that need more than one row. They concern required declarations, inaccurate paths, effects that no
+Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Some judgements
+need more than one row and are made afterwards. They concern required declarations, inaccurate paths, effects that no
 requirement covers, and waivers.
 """
 
@@ -232,7 +232,7 @@ def _rows(model: str, families: Sequence[FamilyRow], cases: int) -> dict[str, Ju
 
 
 def _has_vibration_rows(analysis: Analysis) -> bool:
-    """Whether a vibration is declared or its row is shown."""
+    """Whether a vibration is declared or the row of a vibration is shown."""
     return (
         _vibrates(analysis.mission)
         or analysis.shown is None
@@ -254,8 +254,8 @@ def _undeclared(
 ) -> Iterator[Judged]:
     """Yield rows for errors that no case declares.
 
-    These are rows that are always shown, and rows of errors whose path may be less accurate than declared. `in_doubt`
-    marks the cases with such a path, by platform and kind of error.
+    These are rows that are always shown, and rows of errors of paths that may be less accurate than declared.
+    `in_doubt` marks the cases with such a path, by platform and kind of error.
     """
     subjects = dict(analysis.shown or {})
     for (name, state), is_doubtful in in_doubt.items():
@@ -276,7 +276,7 @@ def _undeclared(
 
 
 def _has_noise(judging: Judging, analysis: Analysis) -> Booleans:
-    """Find the cases that declare an error that spreads power, or a tone that ISLR limits, (cases,).
+    """Find the cases that declare an error that spreads power, or a tone that counts against the ISLR, (cases,).
 
     A motion error spreads power if the part of its phase beyond the cubic term is not negligible.
     """
@@ -323,16 +323,16 @@ def _floor(analysis: Analysis) -> Codes:
 
 
 def _worst(codes: Codes, floor: Codes) -> Codes:
-    """Return the worst of those row statuses `codes` (rows, cases) that count in the verdict of a mission, (cases,).
+    """Return the worst row status that counts in the verdict of a mission, (cases,).
 
-    It is `floor`, (cases,), if that is worse.
+    `codes` (rows, cases) are the statuses of the rows. If `floor` (cases,) is worse, it is returned instead.
     """
     worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
     return np.asarray(np.minimum(worst, floor), dtype=np.int8)
 
 
 class RowStatuses:
-    """Statuses of rows, (rows, cases), and reasons for changes of a status that do not follow from the row alone.
+    """Statuses of rows, (rows, cases), with the reasons for changes that do not follow from a single row.
 
     Each method sets some rows to `not_evaluated`. A row that fails keeps the status `fail`.
     """
@@ -352,7 +352,7 @@ class RowStatuses:
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set the rows of errors that the mission must declare, but does not declare, to `not_evaluated`.
+        """Set rows to `not_evaluated` if their error must be declared but is not.
 
         The first row stands for all required declarations. It becomes `not_evaluated` if any of them is missing, and
         `pass` otherwise.
@@ -377,7 +377,7 @@ class RowStatuses:
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Booleans]) -> None:
-        """Set rows that depend on atmospheric delays assumed as constant to `not_evaluated`.
+        """Set rows to `not_evaluated` if they depend on the assumption that atmospheric delays are constant.
 
         `doubted` maps row ids to masks of the cases to set, (cases,).
         """
@@ -451,9 +451,10 @@ class RowStatuses:
         return np.where(np.isin(self.status, _BROKEN_CODES), indices, -1)
 
     def judges(self) -> Codes:
-        """Find the requirement that judges each row, (rows, cases), as an index in `REQUIREMENT_KEYS`.
+        """Find the requirement against which each row is judged, (rows, cases), as an index in `REQUIREMENT_KEYS`.
 
-        The index is -1 for a row that no requirement judges, and for a required error that is not declared.
+        The index is -1 for a row that is not judged against a requirement, and for a required error that is not
+        declared.
         """
         binding = np.array([row.binding for row in self.rows])
         metric = np.array(
@@ -463,7 +464,7 @@ class RowStatuses:
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
-        """Return the rows with the statuses `status`, (rows, cases).
+        """Return the rows with their statuses replaced by `status`, (rows, cases).
 
         A row whose status has become `info` has no utilization.
         """

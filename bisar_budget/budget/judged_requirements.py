@@ -68,9 +68,9 @@ class RequirementState(NamedTuple):
 
     `decider` is the index of the row that decides the status, or -1. `user` is the index of the row that gives the
     `utilization` of the requirement, or -1. If the requirement is met, with or without a warning, `user` is the row
-    with the largest utilization. It may differ from `decider`, because the row with a warning by the second model
-    alone may have a smaller utilization. `is_unjudged` marks the cases in which the requirement cannot be judged,
-    whether it is waived or not.
+    with the largest utilization. It may differ from `decider`: if only the second model gives a warning for a row,
+    that row decides the status, but its utilization may be smaller. `is_unjudged` marks the cases in which the
+    requirement cannot be judged, whether it is waived or not.
     """
 
     key: str
@@ -134,7 +134,8 @@ def requirement_states(
     utilization : (rows, n)
         Utilizations of the rows; NaN for a row without a utilization.
     judges : (rows, n)
-        Index in `REQUIREMENT_KEYS` of the requirement that judges each row; -1: no requirement.
+        Index in `REQUIREMENT_KEYS` of the requirement against which each row is judged; -1 if there is no such
+        requirement.
     quadratic_use : (rows, n)
         Quadratic phase of each row divided by its limit, whichever requirement sets the allowable; NaN without such a
         phase.
@@ -145,12 +146,13 @@ def requirement_states(
     in_doubt : (rows, n)
         Whether each row belongs to an oscillator whose true noise may differ from the computed noise.
     has_noise : (n,) bool
-        Whether an error that spreads power, or a tone that ISLR limits, is declared. Otherwise ISLR is not judged.
+        Whether an error that spreads power, or a tone that counts against the ISLR, is declared. Otherwise ISLR is
+        not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row limits.
     unjudged : mapping of str to bool or (n,) bool
-        For each requirement key, whether the requirement is not evaluated. It then depends on delays assumed as
-        constant in a long aperture, or on a cause of which the file states only one half.
+        For each requirement key, whether the requirement is not evaluated. The reason is that it depends on delays
+        that are assumed to be constant over a long aperture, or on a cause of which the file states only one half.
     """
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]

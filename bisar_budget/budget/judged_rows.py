@@ -106,7 +106,7 @@ class Judged(NamedTuple):
 
     @classmethod
     def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
-        """Create the row of an error that no case declares."""
+        """Create the row of an error that is not declared in any case."""
         status = np.full(cases, RANK["not_declared"], np.int8)
         return cls._with(row_subject, status, *(np.full(cases, math.nan) for _ in range(3)))
 
@@ -149,7 +149,7 @@ class Judged(NamedTuple):
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """Return the allowable by one of the models, `published` or `full`, whether this model gates or not."""
+        """Return the allowable under `model`, `published` or `full`, whether or not this is the gating model."""
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
@@ -189,7 +189,7 @@ def decibels(amplitude: PerCase) -> Floats:
 
 
 class Judging(NamedTuple):
-    """Settings by which rows are judged: the number of `cases`, and the utilization that gives a warning.
+    """Settings for judging rows: the number of `cases`, and the utilization above which a warning is given.
 
     A utilization above `warn_above` turns a pass into a warning. If `is_complete` is set, all numbers of each row are
     computed. Otherwise only the numbers that decide the status are computed.
@@ -275,7 +275,7 @@ class FamilyRow(ABC):
 
     @abstractmethod
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row for one case, including its text; `model` names the model that judges the row."""
 
 
 def worded(
@@ -293,7 +293,7 @@ def worded(
     without_autofocus: float = 0.0,  # utilization without the gain of autofocus
     **more_fields: Any,  # further fields of the row
 ) -> Row:
-    """Build the report row of one case from a judged row and its texts. The texts do not change the status."""
+    """Build the report row for one case from a judged row and its wording. The wording does not change the status."""
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))

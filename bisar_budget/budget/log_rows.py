@@ -41,10 +41,10 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 class UnsaidResidual(FamilyRow):
     """The row for the residual of a log, for an array of cases.
 
-    The reason of the row is the note on the doubt about the path.
+    The reason for its status is the note on the doubt about the path.
     """
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts. The row is the same for both models."""
+        """Build the report row for one case, including its text. The row is the same for both models."""
         path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
         return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")

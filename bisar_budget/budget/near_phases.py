@@ -25,9 +25,9 @@ from bisar_budget.phrases import NOTHING, Note
 class NearPhases(NamedTuple):
     """Phase errors [rad] that a slow tone causes at its worst starting phase, and their utilizations, (cases,).
 
-    The values are NaN for a tone too fast to cause such phase errors. `use` is the utilization of the stricter limit,
-    and `quadratic_use` is the utilization of the quadratic limit. `without_autofocus` is the utilization of the
-    quadratic limit without the autofocus gain; it is 0 for a faster tone.
+    The values are NaN for a tone that is too fast to cause such phase errors. `use` is the utilization of the
+    stricter limit, and `quadratic_use` is the utilization of the quadratic limit. `without_autofocus` is the
+    utilization of the quadratic limit without the autofocus gain; it is 0 for a tone that is too fast.
     """
 
     use: Floats
@@ -114,7 +114,7 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Write the reason why a tone fails by its phase errors; empty if no phase requirement sets its allowable."""
+    """Explain why a tone fails because of its phase errors; empty if no phase requirement sets its allowable."""
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:

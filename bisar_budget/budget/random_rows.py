@@ -1,8 +1,8 @@
 """Rows of random errors (sensors, clocks, atmosphere), which limit their phase, displacement and spread power.
 
 Independent random errors add in power. The rule `allocation.combine` is for phases and does not apply to powers. Each
-platform's share of the ISLR requirement limits the sum of the powers that wideband vibration, sensor noise and phase
-noise spread.
+platform's share of the ISLR requirement limits the sum of the powers spread by wideband vibration, sensor noise and
+phase noise.
 """
 
 import math
@@ -112,7 +112,7 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
 
 
 class RandomRows:
-    """Builds the rows of random errors, and the rows of the total power that random errors and vibration spread."""
+    """Builds the rows of random errors, and the rows of the total power spread by random errors and vibration."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
@@ -233,7 +233,7 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Yield the rows for the total power that errors spread (ISLR), for each owner and for the mission.
+        """Yield the rows for the total power spread by errors (ISLR), for each owner and for the mission.
 
         In a case in which only wideband vibration and errors with a stated ISLR spread power, the rows of the owners
         do not exist.
@@ -293,7 +293,7 @@ class RandomRows:
             )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
-        """Yield the rows of those `other_errors` for which the file states an ISLR.
+        """Yield a row for each error in `other_errors` for which the file states an ISLR.
 
         Each of these errors may use the full requirement.
         """
@@ -327,8 +327,8 @@ class RandomRows:
 class RandomRow(FamilyRow):
     """The row of one random error, for an array of cases; `place` is the index of the error in the list of errors.
 
-    `is_over_other` marks the cases in which the model that does not gate fails the error. `bound_by_other` names the
-    requirement that limits the error under that model, as an index in `RANDOM_REQUIREMENTS`.
+    `is_over_other` marks the cases in which the error fails under the non-gating model. `bound_by_other` is the index
+    in `RANDOM_REQUIREMENTS` of the requirement that limits the error under this model.
     """
 
     place: int
@@ -337,7 +337,7 @@ class RandomRow(FamilyRow):
     without_autofocus: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
+        """Build the report row for one case, including its text; `gating` names the model that judges the row."""
         mission, allocation, error = case.mission, case.allocation, case.random[self.place]
         combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
         if self.judged.status[case.place] == CODE["fail"]:
@@ -376,7 +376,7 @@ class RandomRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IslrRow(FamilyRow):
-    """The row for the total power that the errors of one owner spread (ISLR), for an array of cases.
+    """The row for the total power spread by the errors of one owner (ISLR), for an array of cases.
 
     `variance` is the variance of the total phase [rad²]. `limit` is the rms phase [rad] that the gating model allows,
     and `limit_of_other` is the rms phase [rad] that the other model allows.
@@ -388,7 +388,7 @@ class IslrRow(FamilyRow):
     limit_of_other: Floats
 
     def in_words(self, case: Case, gating: str) -> Row:
-        """Build the report row of one case, with its texts; `gating` names the model that judges the row."""
+        """Build the report row for one case, including its text; `gating` names the model that judges the row."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
@@ -425,10 +425,10 @@ class IslrRow(FamilyRow):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedRow(FamilyRow):
-    """The row of one of the `other_errors` for which the file states an ISLR [dB], for an array of cases."""
+    """The row for an error in `other_errors` for which the file states an ISLR [dB], for an array of cases."""
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Build the report row of one case, with its texts. The row is the same for both models."""
+        """Build the report row for one case, including its text. The row is the same for both models."""
         mission, row = case.mission, self.judged
         index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.note("no-requirement-of", metric=ISLR), NOTHING
@@ -451,7 +451,7 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
-    """Whether an error depends on a vibration spectrum that the file lacks; the ISLR is then not judged.
+    """Whether an error depends on a vibration spectrum that is missing from the file; ISLR is then not judged.
 
     The result is a Boolean or an array (cases,).
     """
@@ -665,8 +665,8 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
     """Write a note that an oscillator's effect depends on noise below the first point of its mask.
 
-    Of the kinds of effect that depend on this noise, the note describes the one with the largest fraction of it. The
-    note is empty if no kind of effect depends on this noise.
+    Several kinds of effect may depend on this noise. The note describes the kind with the largest fraction of it, and
+    is empty if no kind depends on it.
     """
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
@@ -682,7 +682,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Write a note that the model that does not gate fails an error, with the limit that the error exceeds."""
+    """Write a note that an error fails under the non-gating model, with the limit that the error exceeds."""
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
@@ -697,7 +697,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
     """Return a function that converts an rms phase [rad] to the ISLR [dB] that it causes according to one model.
 
-    A phase of 0 adds no power, which has no level in dB. The function then returns 0.
+    A phase of 0 adds no power and thus has no level in dB. The function then returns 0.
     """
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0

@@ -1,4 +1,4 @@
-"""Builds the report rows and the report entries of requirements for one case, with their texts and numbers.
+"""Builds the report rows, and the report entries of requirements, for one case, with their text and numbers.
 
 An entry gives the limit of a requirement, the value that the mission reaches, and the row that decides its status.
 """
@@ -93,7 +93,7 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
     """Write a note with the required errors that the file does not declare.
 
-    The errors of which the file states nothing come first, then those of which it states only one half.
+    Errors that the file does not mention come first, followed by errors of which it states only one half.
     """
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
@@ -136,9 +136,9 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Write a note on why the image is displaced by an amount that no row limits; empty if no cause is found.
+    """Explain why the image is displaced by an amount that no row limits; empty if no cause is found.
 
-    The cause is clocks that are not set, or an inaccurate path.
+    Possible causes are clocks that are not set, and an inaccurate path.
     """
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:

@@ -51,7 +51,7 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Effects that delays assumed as constant in long apertures would have if they changed.
+    """Effects that delays would have if they changed, although they are assumed to be constant over a long aperture.
 
     `uses` maps row ids to the effect of the changing delays on the row. `untaken` lists the effects that no
     requirement covers, computed with the changing delays. Both are empty if no case has such a delay.
@@ -66,8 +66,8 @@ class StayingAir:
     def _delays(self) -> frozenset[str]:
         """Ids of the rows of the single delays.
 
-        With `combine: each`, the quadratic requirement limits these rows directly. Another requirement may set the
-        allowable of such a row. The status of the row is then not that of the quadratic requirement.
+        With `combine: each`, the quadratic requirement limits these rows directly. If another requirement sets the
+        allowable of such a row, the status of the row is not the status of the quadratic requirement.
         """
         return frozenset(error.id for error in self.errors)
 
@@ -104,7 +104,7 @@ class StayingAir:
     def reason(self, case: Case, row_id: str) -> Note:
         """Describe the effect of changing delays on a row in one case, and name the key to add to the file.
 
-        The key is that which states how the delays change.
+        This key states how the delays change over time.
         """
         use = self.uses.get(row_id)
         if use is not None:
@@ -160,7 +160,7 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Compute how delays that are assumed as constant in long apertures would affect the rows if they changed."""
+    """Compute the effects on rows that delays assumed constant over a long aperture would have if they changed."""
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -226,7 +226,7 @@ def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCas
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
-    """Compute that effect of a changing delay which the requirement `key` limits.
+    """Compute the effect that the requirement `key` limits, for a delay that changes.
 
     The effect is a phase [rad] or a displacement [m].
 

@@ -37,9 +37,9 @@ SENSITIVITY = "acceleration_sensitivity"
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
     """Judge the highest echo that all tones together can make, with the worst combination of their starting phases.
 
-    Both models use first principles for this row, because shares by the rule of the paper would be 3 dB stricter.
-    Tones that are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from different
-    sources.
+    Both models derive this row from first principles, because shares according to the paper's rule would be 3 dB
+    stricter. Tones that are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from
+    different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")
@@ -62,7 +62,7 @@ class PslrRow(FamilyRow):
     highest: Echo | None
 
     def in_words(self, case: Case, _: str) -> Row:
-        """Build the report row of one case, with its texts. The row is the same for both models."""
+        """Build the report row for one case, including its text. The row is the same for both models."""
         over = NOTHING
         if self.highest is not None:
             makers = [
@@ -119,7 +119,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 def _is_used(size: PerCase, limit: PerCase) -> Booleans:
     """Whether a size lies between a tenth of its limit and the limit, (cases,).
 
-    A doubt about such a size affects the verdict. A smaller size passes anyway, and a larger one fails.
+    A doubt about such a size affects the verdict. A smaller size passes anyway, and a larger size fails.
     """
     return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
@@ -129,14 +129,14 @@ class SpurRow(FamilyRow):
     """The row of one spur of an oscillator, for an array of cases.
 
     The size of the row is the level of the spur's echo relative to the response [dB]. `spur_index` is the index of
-    the spur. `is_over_other` marks the cases in which the model that does not gate fails the row.
+    the spur. `is_over_other` marks the cases in which the row fails under the non-gating model.
     """
 
     spur_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row for one case, including its text; `model` names the model that judges the row."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
@@ -186,8 +186,8 @@ class SpurRow(FamilyRow):
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
     """Write a note that the part of a tone below one cycle per aperture is judged in the row `row_id`.
 
-    Exchanges of pulses fold a tone to low frequencies. The result is empty if no part of the tone is folded to less
-    than one cycle per aperture.
+    Synchronisation by an exchange of pulses folds (aliases) a tone to low frequencies. The result is empty if no part
+    of the tone is folded to less than one cycle per aperture.
     """
     slow = [
         (float(share), float(frequency))
@@ -254,14 +254,14 @@ class AcceleratedRow(FamilyRow):
     """The row of one tone that an oscillator feels as an acceleration, for an array of cases.
 
     `is_there` marks the cases in which the tone is fast enough for this row. `tone_index` is the index of the tone in
-    `accelerated_tones`. `is_over_other` marks the cases in which the model that does not gate fails the row.
+    `accelerated_tones`. `is_over_other` marks the cases in which the row fails under the non-gating model.
     """
 
     tone_index: int
     is_over_other: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row for one case, including its text; `model` names the model that judges the row."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.note("no-requirement-of", metric="pslr")
@@ -304,11 +304,10 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
-    """Quadratic and cubic phase [rad] of the parts of a tone below three cycles per aperture.
+    """Quadratic and cubic phase [rad] of a folded tone, from its parts below three cycles per aperture.
 
-    Each part has its worst starting phase.
-
-    `free` is the peak phase of the tone without synchronisation [rad].
+    Each part is taken at its worst starting phase, and the phases of all parts are added. `free` is the peak phase of
+    the tone without synchronisation [rad].
     """
     qpe: PerCase = 0.0
     cubic: PerCase = 0.0
@@ -326,7 +325,7 @@ def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Return where an oscillator's acceleration sensitivity comes from: its catalogue part, or else its `source`."""
+    """Return the origin of an oscillator's acceleration sensitivity: its catalogue part, or else its `source`."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
@@ -344,7 +343,7 @@ def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     """Return the notes on the row of an oscillator's acceleration sensitivity.
 
-    They tell which vibration the oscillator is assumed to feel, which tones have rows of their own, and what remains
+    They state which vibration the oscillator is assumed to feel, which tones have rows of their own, and what remains
     after synchronisation.
     """
     felt_vibration = felt(mission, name)

@@ -1,4 +1,4 @@
-"""Adds the verdicts of simulated images to the rows of a check, and selects the verdicts to show."""
+"""Adds verdicts that were obtained from simulated images to the rows of a check, and selects the verdicts to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -17,21 +17,22 @@ _SHOWN_ROWS = 4  # largest number of rows shown for a mission
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
-    """Add the verdicts of images to the findings of a check.
+    """Add the verdicts from simulated images to the findings of a check.
 
     If an image refutes the limit of a declared row, the row fails, and so does its requirement. A row that passes
     only with autofocus also fails if the image refutes the autofocus. If the file does not declare the error of a
     row, the row only reports that its limit is refuted. A warning is given if an image refutes a limit for which the
-    check has no row, and if no image gave a verdict.
+    check has no row, or if no image gave a verdict.
 
     Parameters
     ----------
     findings : MissionFindings
         Findings of the check.
     verified : VerifiedMission
-        Verdicts of the mission's images.
+        Verdicts from the simulated images of the mission.
     today : date, optional
-        Day (UTC) on which waivers are judged for rows that fail because of an image; omitted: waivers do not apply.
+        Day (UTC) on which waivers are judged for rows that fail because of an image. If omitted, waivers do not
+        apply.
     """
     verdicts = verified.rows
     by_id = {verdict.id: verdict for verdict in verdicts}
@@ -121,9 +122,10 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """Return the requirement with the status of its worst row that an image refutes.
+    """Return the requirement with the status of its worst refuted row, if that status is worse than its own.
 
-    It considers the rows that judge the requirement, and the rows that the requirement limits.
+    A row is refuted if an image contradicts its limit. The rows that determine the verdict on the requirement are
+    considered, and the rows whose limit follows from the requirement.
     """
     judges = [
         row

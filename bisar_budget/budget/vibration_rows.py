@@ -1,4 +1,4 @@
-"""Rows of vibration: single sinusoids (lines) of a platform, groups of neighbouring lines, and wideband noise."""
+"""Budget rows for platform vibration: single sinusoids (lines), groups of neighbouring lines, and wideband noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -44,7 +44,7 @@ _ROUNDING_DB = 1e-6  # tolerance for rounding of a level
 
 
 class Vibrations:
-    """Builds the rows of vibrations, for an array of cases."""
+    """Builds the budget rows for vibration, for an array of cases."""
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
@@ -76,11 +76,11 @@ class Vibrations:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
-        """Yield all rows of vibration under one model, in the order of the JSON output.
+        """Yield all vibration rows under one model, in the order of the JSON output.
 
-        `model` is `published` or `full`. A platform without declared lines has one row for lines, with the status
-        `not_declared`. A line that has less than one cycle per aperture in only some of the cases has two rows, one
-        for these cases and one for the others.
+        `model` is `published` or `full`. A platform without declared lines gets a single row for lines, with the
+        status `not_declared`. A line with less than one cycle per aperture in only some of the cases gets two rows:
+        one for these cases and one for the remaining cases.
         """
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
@@ -148,8 +148,8 @@ class Vibrations:
     def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """Build the row of a line with one or more cycles per aperture.
 
-        The level of its echoes is judged if PSLR limits the line. Their power is judged if ISLR limits it. Below
-        three cycles per aperture, the quadratic and cubic phase of the line are limited as well.
+        If the PSLR limits the line, the level of its echoes is compared with the limit; if the ISLR does, the power
+        of its echoes. Below three cycles per aperture, the quadratic and cubic phase of the line are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -182,8 +182,9 @@ class Vibrations:
     def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
         """Build the row of a line with less than one cycle per aperture.
 
-        The line is judged by its quadratic and cubic phase. For a vibration along three axes, the declared size is an
-        amplitude along the line of sight. It is chosen so that it has the same utilization as the vibration.
+        The quadratic and cubic phase of the line are compared with their limits. For a vibration along three axes,
+        the declared size in the row is an amplitude along the line of sight that has the same utilization as the
+        vibration.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -224,7 +225,7 @@ class Vibrations:
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
         """Yield the rows of groups of lines whose frequencies are so close that their echoes add.
 
-        The size of each row is an amplitude [m]: a single line with this amplitude would make an equally high echo.
+        The size in each row is the amplitude [m] of a single line whose echo is as high as that of the group.
         """
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
@@ -265,18 +266,18 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VibrationRow(FamilyRow):
-    """The row of a line, of a group of neighbouring lines, or of a platform's noise, for an array of cases.
+    """Row for a spectral line, a group of neighbouring lines, or the noise of a platform, for an array of cases.
 
     `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase [rad] of a motion below
-    three cycles per aperture, at its worst starting phase. If `is_slow` is set, only these phases judge the motion.
-    Otherwise its echoes judge it too. `is_over_other` marks the cases in which the model that does not gate fails the
-    row.
+    three cycles per aperture, at its worst starting phase. If `is_slow` is set, only these phases have limits;
+    otherwise the echoes of the motion have a limit too. `is_over_other` marks the cases in which the row fails under
+    the model that is not the gating model.
 
     If lines of both platforms are neighbours, their echoes add. `both` is the peak phase [rad] of a single line with
-    an echo as high as this sum. `level` is the level of that echo [dB], and `is_over_both` marks the cases in which
-    it is too high.
+    an echo as high as the sum of these echoes. `level` is the level of that echo [dB], and `is_over_both` marks the
+    cases in which it is too high.
 
-    Sizes of the row are `per_metre` times the sizes in metres.
+    `per_metre` converts sizes from metres to the unit of the row.
     """
 
     limits: VibrationLimits | None = None
@@ -299,7 +300,7 @@ class VibrationRow(FamilyRow):
         return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
-        """Build the report row of one case, with its texts; `model` names the model that judges the row."""
+        """Build the report row of one case, including its notes; `model` is the model that determines the verdict."""
         row_subject = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:
@@ -365,7 +366,7 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """Build the report row of a line, a group of lines or noise, if echoes or spread power judge it.
+    """Build the report row of a line, a group of lines or noise whose echoes or spread power are limited.
 
     `key` is the key of the declared value below `vibration`. In the report, `notes` come before the notes on the
     limit of the row, and `more` after them.

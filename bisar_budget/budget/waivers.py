@@ -1,7 +1,7 @@
-"""Applies waivers to rows and requirements, and collects what affects the verdict from outside the mission file.
+"""Applies waivers to rows and requirements, and lists influences on the verdict from outside the mission file.
 
-The findings list valid, expired and unused waivers. They also list the options, settings, environment variables and
-catalogue parts of the project that affect the verdict.
+Valid, expired and unused waivers are listed in the findings, and so are the options, settings, environment variables
+and project catalogue parts that affect the verdict.
 """
 
 import os
@@ -40,7 +40,7 @@ class Waived(NamedTuple):
     covered: Sequence[tuple[int, int]]  # per waiver: number of named rows, and number of broken rows among them
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
-        """Yield a warning for each waiver that has no effect, and for each that covers every row.
+        """Yield a warning for each waiver that has no effect, and for each waiver that covers every row.
 
         A waiver has no effect if it names no row, or only rows that are not broken. A row is broken if it fails or is
         not evaluated. A waiver that names a broken requirement has an effect.

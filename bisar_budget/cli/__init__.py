@@ -138,8 +138,8 @@ def cli() -> None:
 def main() -> None:
     """Run the command-line program.
 
-    After SIGTERM or SIGHUP the program exits without leaving worker processes or temporary files. Warnings of
-    libraries are ignored, because users cannot mend them, and PYTHONWARNINGS could turn them into errors.
+    After SIGTERM or SIGHUP the program exits without leaving worker processes or temporary files. Library warnings
+    are ignored, because users cannot fix them and PYTHONWARNINGS could turn them into errors.
     """
     warnings.simplefilter("ignore")
     # Workers start as `python -c`, which would import from the current folder, unlike an installed command.

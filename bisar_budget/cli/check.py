@@ -92,8 +92,8 @@ class _Gate(click.Command):
     def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
         """Return option defaults for a run with several projects, from the settings of these projects.
 
-        Only the options in `_OF_RUN` that have the same value in all settings get a default. For the others a warning
-        is written.
+        Only the options in `_OF_RUN` that have the same value in all settings get a default. A warning is written for
+        each of the remaining options.
         """
         agreed = {}
         for key in _OF_RUN:
@@ -390,7 +390,7 @@ def check(
             found |= zip(project.files, results_of_project, strict=True)
 
         def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
-            """Make the report on the mission files `its_files`; `of` are their projects, whose options it states."""
+            """Make the report on the mission files `its_files`, with the options of their projects `of`."""
             its_missions = tuple(found[file] for file in its_files)
             # The day is reported only if it was given or decides a waiver, so that other reports are reproducible.
             is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
@@ -508,7 +508,7 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
 
 
 def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
-    """Raise `click.UsageError` if `--sweep` is given but no requested report can show it, or for over two keys."""
+    """Raise `click.UsageError` if `--sweep` varies more than two keys, or if no requested report can show it."""
     if not texts:
         return
     if not any(FORMATS[name].is_illustrated for name in formats):

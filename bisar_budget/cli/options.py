@@ -1,4 +1,4 @@
-"""Options that several commands have, and the origins of option values: command line, environment or settings."""
+"""Options shared by several commands, and the origins of option values: command line, environment or settings."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -75,7 +75,7 @@ OUTPUT = output_option()
 
 
 def answer_options(command: str, words: str = "", output: str = "", metavar: str = "FILE") -> _Option:
-    """Make the options `--format` and `--output` of a command whose answer is in the table of answers.
+    """Make the options `--format` and `--output` of a command in the table `ANSWERS`.
 
     `words` is added to the help text of `--format`. `output` replaces the help text of `--output`.
     """
@@ -165,7 +165,7 @@ def scheduler_options(doing: str, more: str = "") -> _Option:
 
 
 def origin_of(parameter: click.Parameter) -> str:
-    """Text that says where a parameter has its value from: command line, environment, a settings file or default."""
+    """Describe where the value of a parameter comes from: command line, environment, a settings file or default."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
         return COMMAND_LINE

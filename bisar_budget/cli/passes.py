@@ -198,9 +198,9 @@ def _name(satellite_pass: "SatellitePass", file: str) -> str:
 
 
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
-    """End the command with an error if a mission cannot be used in its folder, or its status is not that of its pass.
+    """End the command with an error if a mission is unusable in its folder, or has another status than its pass.
 
-    `texts` contains the texts of the mission files by path, in the order of `passes`.
+    `texts` maps the path of each mission file to its content, in the order of `passes`.
     """
     from bisar_budget.faults import MissionError
     from bisar_budget.front.checks import check

@@ -1,4 +1,4 @@
-"""Grouping of the missions of a run by their settings; a mission uses the `pyproject.toml` nearest to it."""
+"""Groups the missions of a run by their settings; each mission uses the nearest `pyproject.toml`."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ class Project:
 
 
 def folder_of_file(file: str) -> str | None:
-    """Absolute path of the folder of a mission file, which may be missing; None if the folder does not exist."""
+    """Absolute path of the folder of a mission file; None if there is no such folder. The file may be missing."""
     folder = os.path.dirname(file) or os.curdir
     return os.path.abspath(folder) if "\0" not in file and os.path.isdir(folder) else None
 

@@ -47,7 +47,7 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load mission files, and replace values by `changes`; if any is unusable, write all faults and exit."""
+    """Load mission files, and apply `changes` to them; if any is unusable, write all faults and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
@@ -129,10 +129,10 @@ def _is_open_as(file: str | int, path: str) -> bool:
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Return the folder relative to which reports name files that are in no Git repository.
+    """Return the folder that reports use as the base of relative names of files outside any Git repository.
 
-    The folder is the checkout of a GitHub Actions run, or else the current folder. The second value says whether it
-    is the checkout. The name of the folder is empty if the current folder was removed.
+    The folder is the checkout of a GitHub Actions run, or else the current folder. The second value is True if it is
+    the checkout. The path is empty if the current folder was removed.
     """
     try:
         here = os.getcwd()
@@ -184,10 +184,10 @@ _LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line
 
 
 def harmless(text: str, format_name: str = "") -> str:
-    """Escape the characters of a text that would act on a terminal, or on a CI runner that reads the log.
+    """Escape characters in a text that would control a terminal, or a CI runner that reads the log.
 
-    In the format `github`, workflow commands remain; in the format `text`, the colours of a report remain. In
-    messages, which have no format name, neither remains.
+    In the format `github`, workflow commands are kept; in the format `text`, the colours of a report are kept. In
+    messages, which have no format name, both are escaped.
     """
 
     def escaped(match: re.Match[str]) -> str:
@@ -235,7 +235,7 @@ def drop_output() -> None:
 
 
 def complain(message: str) -> None:
-    """Write a message to standard error; a failure of this is ignored."""
+    """Write a message to standard error, ignoring any failure to write it."""
     with suppress(OSError):
         click.echo(harmless(message), err=True)
 
@@ -257,7 +257,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
 def deliver_answer(command: str, answers: "Sequence[object]", format_name: str | None, output: str | None) -> None:
     """Write the answers of a command, one for each mission, to `output`, or to standard output if it is None or `-`.
 
-    Without a format name, the format is that of the suffix of `output`, or else text.
+    Without a format name, the format follows from the suffix of `output`; without a suffix it is text.
     """
     from bisar_budget.extras import MissingExtraError
     from bisar_budget.report import Style
@@ -283,9 +283,9 @@ def deliver_answer(command: str, answers: "Sequence[object]", format_name: str |
 
 
 def _format_of_output(command: str, output: str | None) -> str:
-    """Format of the suffix of an output file; text without a suffix, and for standard output.
+    """Return the format that the suffix of an output file implies; `text` for no suffix and for standard output.
 
-    Raises `click.UsageError` if the suffix belongs to no format of the command.
+    Raises `click.UsageError` if the command has no format with this suffix.
     """
     from bisar_budget.report.answers import format_of_file, suffixes
 
@@ -298,7 +298,7 @@ def _format_of_output(command: str, output: str | None) -> str:
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Write content to a file, which it replaces only when it is complete, as described in `replacing`."""
+    """Write content to a file; an existing file is replaced only once writing is complete, see `replacing`."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as name, open(name, "wb") as file:
         file.write(data)
@@ -310,8 +310,8 @@ def replacing(path: str) -> Iterator[str]:
 
     The temporary file is in a temporary folder beside `path`. If `path` is a symbolic link, its target is replaced
     and the link remains. After an error or an interrupt the old file remains. Named pipes, sockets and devices are
-    refused, except open streams of this process, which are written to directly. Temporary folders that killed
-    commands left are removed.
+    refused, except open streams of this process, which are written to directly. Temporary folders left behind by
+    killed commands are removed.
     """
     temporary = lock = None
     try:
@@ -371,7 +371,7 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 
 def _remove_abandoned(folder: str) -> None:
-    """Remove the temporary folders in `folder` that ended commands left, which are no longer locked."""
+    """Remove the unlocked temporary folders in `folder`, which were left behind by commands that have ended."""
     import shutil
 
     prefix, suffix = _TEMPORARY

@@ -183,7 +183,7 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Tell the user the expected time of a long sweep; refuse over `MAX_UNFORCED_CASES` cases without `--force`."""
+    """Report the expected duration of a long sweep; refuse more than `MAX_UNFORCED_CASES` cases without `--force`."""
     from bisar_budget.front.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()

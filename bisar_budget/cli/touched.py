@@ -1,4 +1,4 @@
-"""Search for the missions that changed files affect: changed missions, and missions that read a changed file."""
+"""Finds the missions that are affected by changed files: changed missions, and missions that read a changed file."""
 
 import os
 import re

@@ -46,7 +46,7 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 
 
 def question_of(asked: Asked) -> Question:
-    """Collect all inputs that determine the values of parts, keyed by the words that describe the inputs in messages.
+    """Return all inputs that determine the values of parts, keyed by the description of each input in messages.
 
     Parts with equal questions can be combined.
     """
@@ -101,7 +101,7 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
 
 
 class PartsFolder:
-    """The parts of one question in a folder; `done` is the set of the indices of their first cases."""
+    """The finished parts of one question in a folder; `done` contains the index of the first case of each part."""
 
     def __init__(self, path: str, question: Question) -> None:
         self.path, self.question, self.done = path, question, set[int]()

@@ -82,7 +82,7 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 
 
 def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
-    """Start a scheduler and `count` workers on this machine, and register their end in `ends`.
+    """Start a scheduler and `count` workers on this machine, and register their shutdown in `ends`.
 
     They are started in a separate thread, which Ctrl-C does not interrupt. If the start itself were interrupted, the
     cluster could not be closed.
@@ -189,9 +189,9 @@ class Workers:
         """Call `function(common, block)` on workers for each block, and yield the blocks with their results.
 
         The order of the results is arbitrary. `about` returns the name of a block for messages. Only a few blocks per
-        thread are submitted ahead. Raises `ClusterError` if the scheduler or all workers are lost, if every worker
-        that received a block ended, or if a worker cannot compute a block. Raises `RuntimeError` if the function
-        raised an error.
+        thread are submitted in advance. Raises `ClusterError` if the scheduler or all workers are lost, if every
+        worker that received a certain block was lost, or if a worker cannot compute a block. Raises `RuntimeError` if
+        the function raised an error.
         """
         finished: SimpleQueue[Future[Result]] = SimpleQueue()
         # The common data are the result of a task, so that Dask can create them again if their worker is lost.

@@ -1,13 +1,13 @@
 """Specifications of several errors: the largest sizes with which a mission meets every requirement.
 
 The utilization of a row of the budget is its error divided by its limit. Each row that can fail has an allowed
-utilization. An error adds a power of its size to the row: the square if errors combine by root-sum-square or powers
-add, the size itself if errors add linearly. The errors without a specification use a part of each allowed
-utilization. The search divides the remaining part among the specified errors so that the sum of weight·log(size) is
-largest; the module `geometric_program` solves this problem. Phases follow from exact ranges, so they are valid for
-errors of any size, but not proportional to the size. Each round of the search therefore makes full checks with each
-error 20 % larger and 20 % smaller than in the round before, and measures the contribution of the error to each row.
-The search ends when the sizes no longer change. Values are in SI and radians.
+utilization. An error contributes a power of its size to the row: the square if errors combine by root-sum-square or
+if their powers add, and the size itself if errors add linearly. The errors without a specification use a part of each
+allowed utilization. The search divides the remaining part among the specified errors so that the sum of
+weight·log(size) is largest; the module `geometric_program` solves this problem. Phases follow from exact ranges, so
+they are valid for errors of any size, but not proportional to the size. Each round of the search therefore makes full
+checks with each error 20 % larger and 20 % smaller than in the round before, and measures the contribution of the
+error to each row. The search ends when the sizes no longer change. Values are in SI and radians.
 """
 
 import math
@@ -50,14 +50,14 @@ class AllocationSettings:
     end_steps : int
         Number of sizes that are tried between two known sizes, to find the largest size at which an image forms.
     max_shrinks : int
-        Largest number of times that all sizes are reduced by a tenth. All these reductions together are 18 powers of
-        ten.
+        Largest number of times that all sizes are reduced by a tenth. All these reductions together amount to 18
+        orders of magnitude.
     free_ratio : float
         Ratio of the largest to the smallest size that is tried for an error that no row seems to limit.
     free_steps : int
         Number of sizes that are tried in the range of `free_ratio`.
     free_fraction : float
-        Largest fraction of an allowed utilization that an error which no row seems to limit may use.
+        Largest fraction of any allowed utilization that may be used by an error that no row seems to limit.
     close_fraction : float
         Margin that is kept below an allowed utilization when sizes are reduced, as a fraction of this utilization.
     """
@@ -90,7 +90,7 @@ def allocate(
 
     Arguments are those of `bisar_budget.allocate`; `keys` maps keys to weights. The split, the rule of combination,
     the coverage factor, autofocus and the model are those of the mission. Waivers are ignored. The sheet contains the
-    verdict of a full check of the mission with the ordered sizes. `progress` is called with the number of finished
+    verdict of a full check of the mission with the specified sizes. `progress` is called with the number of finished
     rounds and the largest number of rounds.
 
     Raises
@@ -160,8 +160,9 @@ class _SizeSearch:
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
         """Find the largest sizes, and the rows that limit them.
 
-        Returns the sizes (sizes,), with NaN for an error that no row limits. Also returns the limiting rows, the most
-        restrictive row first. Each round uses utilizations near the sizes of the round before.
+        Returns the sizes (sizes,), with NaN for an error that no row limits, and the limiting rows, the most
+        restrictive row first. The search is iterative: each round evaluates the utilizations near the sizes found in
+        the previous round.
         """
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
@@ -232,10 +233,10 @@ class _SizeSearch:
             self.mission.ends[index] = self._end_between(index, inside, min(sizes[index], self.mission.ends[index]))
 
     def _end_between(self, index: int, inside: Floats, high: float) -> float:
-        """Find the largest size of the error with the number `index` at which an image still forms.
+        """Find the largest size of the error with index `index` at which an image still forms.
 
-        The search is between the size in `inside`, at which an image forms, and `high`. The other errors have the
-        sizes `inside`.
+        Sizes from `inside[index]`, at which an image forms, to `high` are tried. The other errors keep their sizes
+        `inside`.
         """
         low = float(inside[index])
         for _ in range(2):
@@ -248,7 +249,7 @@ class _SizeSearch:
         return low
 
     def _first_sizes(self) -> Floats:
-        """Choose the first sizes of the search, (sizes,), so small that all errors together fit into every row."""
+        """Choose initial sizes for the search, (sizes,), so small that all errors together exceed no limit."""
         count = self.mission.tiny.size
         cases = np.repeat(self.mission.tiny[:, None], count + 1, axis=1)
         cases[np.arange(count), np.arange(1, count + 1)] *= 2
@@ -266,8 +267,8 @@ class _SizeSearch:
         """Reduce the sizes until no row exceeds its allowed utilization.
 
         Returns the sizes (sizes,), with NaN for an error that no row limits, and the limiting rows with the shares of
-        each error. `before` has the constraints on the location error from earlier rounds of the search. In these
-        rounds the largest displacement had another direction.
+        each error. `before` contains the constraints on the location error from earlier rounds of the search, in
+        which the direction of the largest displacement was different.
         """
         near = self.mission.near(sizes)
         for _ in range(ALLOCATION_SETTINGS.max_shrinks):
@@ -300,7 +301,7 @@ class _SizeSearch:
     def _with_earlier(
         before: Rows, program_multipliers: Floats, near: Near, sizes: Floats, shares: Floats, multipliers: Floats
     ) -> None:
-        """Merge the constraints from earlier directions of the displacement into the row of the location error.
+        """Merge constraints for earlier directions of the largest displacement into the row of the location error.
 
         The multipliers of the constraints `before` are added to the multiplier of the row. The shares of the errors
         are averaged with the multipliers as weights. `shares` and `multipliers` are changed in place.
@@ -317,7 +318,7 @@ class _SizeSearch:
             multipliers[index] = total
 
     def _used(self, near: Near, sizes: Floats) -> Floats:
-        """Compute the utilizations (rows,) of the rows of `near`, for errors of the sizes (sizes,)."""
+        """Compute the utilizations (rows,) of the rows of `near` if the errors have the sizes `sizes`, (sizes,)."""
         row_uses = self.mission.uses(sizes[:, None])
         uses = dict(zip(row_uses.ids, row_uses.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
@@ -325,9 +326,9 @@ class _SizeSearch:
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
         """Yield the rows that limit the sizes, the row with the largest multiplier first.
 
-        `used` (rows,) are the utilizations. In a row with the power p, the p-th powers of the contributions add:
-        `parts` (limiting rows, sizes) are these powers, divided by the p-th power of the allowed utilization.
-        `multipliers` (limiting rows,) tell how strongly each row limits the sizes, see `RowUse`.
+        `used` (rows,) are the utilizations. In a row with the exponent p, the p-th powers of the contributions of the
+        errors add. `parts` (limiting rows, sizes) are these p-th powers, divided by the p-th power of the allowed
+        utilization. `multipliers` (limiting rows,) describe how strongly each row limits the sizes, see `RowUse`.
         """
         row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():
@@ -345,9 +346,9 @@ class _SizeSearch:
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Find the largest share of one error in any row of each requirement, by the key of the requirement.
+    """Return, for each requirement, the largest share that one error has in any row of that requirement.
 
-    `key` is the key of the error.
+    `key` is the key of the error. The result is keyed by requirement.
     """
     shares: dict[str, float] = {}
     for row in rows:
@@ -360,7 +361,7 @@ def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
 def _sheet(
     specified_mission: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
 ) -> SpecificationSheet:
-    """Make the sheet of specifications from the found sizes, and check the mission with the ordered sizes."""
+    """Make the sheet of specifications from the sizes found, and check the mission with the specified sizes."""
     parts = catalogue(specified_mission.stated)
     specifications = tuple(
         _specification(specified_mission.stated, error, float(error.numbers(np.array(size))), rows, parts)

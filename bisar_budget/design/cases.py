@@ -50,8 +50,8 @@ _KEY_HEADER_PATTERN = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([
 class Cases:
     """Cases of a sweep: the varied keys, and for each key a column of values.
 
-    Values are numbers in SI, or words. The cases of a grid are all combinations of the values of the columns, and the
-    last key varies fastest. Without a grid all columns have the same length, and each case takes one row of them.
+    Values are numbers in SI, or strings. The cases of a grid are all combinations of the values of the columns, and
+    the last key varies fastest. Without a grid all columns have the same length, and each case takes one row of them.
     """
 
     varied: tuple[Varied, ...]
@@ -79,20 +79,20 @@ class Cases:
 
 # ---------------------------------------------------------------- cases of arrays
 def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
-    """Make the cases with every combination of values, given as arrays; the last key varies fastest.
+    """Make the cases for every combination of the given values; the last key varies fastest.
 
     Parameters
     ----------
     tree : dict
-        Content of the mission file as text.
+        Content of the mission file, as strings, lists and mappings.
     values : mapping
-        Values (n,) of each key: numbers in SI, or words. Numbers that a key does not accept are only found when
-        their case is checked.
+        Array of values (n,) for each key: numbers in SI, or strings. A number that a key does not accept is only
+        detected when its case is checked.
 
     Raises
     ------
     QuestionError
-        A key is unknown, takes neither a number nor a word, or has no values.
+        A key is unknown, accepts neither numbers nor strings, or has no values.
     """
     varied: list[Varied] = []
     arrays: list[Values] = []
@@ -117,7 +117,7 @@ def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
-    """Convert the words of an option to an array; raises `QuestionError` for an invalid word.
+    """Convert the string values of an option to an array; raises `QuestionError` for an invalid value.
 
     Names of parts and files are only checked when the mission is read with them.
     """
@@ -128,10 +128,10 @@ def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
 
 
 def _wrong_word(choices: Choices, word: str) -> str:
-    """Describe why a key does not accept a word.
+    """Describe why a key does not accept a string value.
 
-    The text is empty if the key accepts the word. It is also empty if only reading the mission with the word can
-    tell.
+    Returns an empty string if the key accepts the value, or if this can only be decided by reading the mission with
+    it.
     """
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
@@ -144,9 +144,9 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """Parsed text of an option `--vary`: the varied key with its values.
+    """Parsed option `--vary`: the varied key with its values.
 
-    The values are words, numbers in SI, or the ends and the count of a range.
+    The values are strings, numbers in SI, or the ends and the count of a range.
     """
 
     option: str
@@ -158,26 +158,25 @@ class _Asked(NamedTuple):
 
 
 def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
-    """Make the cases with every combination of the values of options `--vary`.
+    """Make the cases for every combination of the values in the options `--vary`.
 
     An option is `KEY=FROM:TO UNIT:COUNT`, followed by `:log` for equal ratios, or `KEY=VALUE,VALUE,...`. For keys
-    whose values are words the option is `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the
+    whose values are strings the option is `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the
     unit of the option, so that 0:180deg:181 contains exactly 60 deg.
 
     Parameters
     ----------
     tree : dict
-        Content of the mission file as text.
+        Content of the mission file, as strings, lists and mappings.
     texts : sequence of str
-        Texts of the options `--vary`. An end or a value without a unit has the unit of the last end or value in the
-        same text.
+        Options `--vary`. An end or a value without a unit has the unit of the last end or value in the same option.
     name : str
         Name of the option for messages.
 
     Raises
     ------
     QuestionError
-        A key is unknown, repeated or has no number, a range is empty or reversed, or a key cannot have a value.
+        A key is unknown, repeated or has no number, a range is empty or reversed, or a key does not accept a value.
     """
     every = [(asked.varied, _axis(asked)) for asked in _all_asked(tree, texts, name)]
     return Cases(tuple(varied for varied, _ in every), tuple(axis for _, axis in every), is_grid=True)
@@ -207,9 +206,9 @@ def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
     Parameters
     ----------
     tree : dict
-        Content of the mission file as text.
+        Content of the mission file, as strings, lists and mappings.
     texts : sequence of str
-        As in `grid`. Counts of ranges are ignored, lists of numbers are refused, and all words of a key are drawn
+        As in `grid`. Counts of ranges are ignored, lists of numbers are refused, and all strings of a key are drawn
         equally often.
     how : str
         `latin:COUNT:SEED`; the same seed gives the same cases.
@@ -247,7 +246,7 @@ def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
 
 
 def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
-    """Parse the texts of all options; raises `QuestionError` if there is no text, or if a key is repeated."""
+    """Parse all options; raises `QuestionError` if there are no options, or if a key is repeated."""
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_ACCEPTED_VARIATIONS}")
     seen: set[tuple[str, ...]] = set()
@@ -288,7 +287,7 @@ def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
 def _range(option: str, number: Number, fields: list[str]) -> _Asked:
     """Parse the range of an option `--vary`.
 
-    `fields` are the parts of the text of the range, which colons separate.
+    `fields` are the colon-separated fields of the range.
     """
     if is_log := len(fields) > 2 and fields[-1] == "log":
         fields.pop()
@@ -306,9 +305,9 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Parse the values of an option; a value without a unit has the unit of the last text.
+    """Parse the values of an option; a value without a unit takes the unit of the last value.
 
-    Returns the number with the unit of the last text, and the values in SI.
+    Returns the number with the unit of the last value, and the values in SI.
     """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
@@ -324,17 +323,17 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 def _usable_unit(unit: str, dimension: Dimension) -> str:
     """Choose the unit in which values of an option are spaced or rounded.
 
-    The result is `unit`, or the SI unit if `unit` is empty or is a unit with an offset of its zero. The result is
-    empty if the dimension has no suitable unit.
+    The result is `unit`, or the SI unit if `unit` is empty or its zero is offset from that of the SI unit. The result
+    is empty if the dimension has no suitable unit.
     """
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
 
 def _count(text: str, subject: str, least: int, hint: str = "") -> int:
-    """Read a whole number of at least `least` from a text.
+    """Parse an integer that must be at least `least`.
 
-    For an invalid number it raises an error whose message begins with `subject` and ends with `hint`.
+    If the text is invalid, an error is raised whose message begins with `subject` and ends with `hint`.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= 18 and int(text) >= least):
         raise QuestionError(f"{subject} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
@@ -368,7 +367,7 @@ def sampled_cases(cases: Cases, count: int) -> Cases:
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Yield each varied key whose values are words, with the list of its different words."""
+    """Yield each varied key whose values are strings, with the list of its distinct values."""
     for varied, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(varied, Choices):
             yield varied, list(dict.fromkeys(words.tolist()))
@@ -413,13 +412,14 @@ def table_file(tree: JsonObject, path: str) -> Cases:
 def table(tree: JsonObject, text: str, file: str) -> Cases:
     """Read cases from CSV: the first line has a header `KEY [unit]` for each column, each further line is a case.
 
-    Empty lines and lines that begin with `#` are ignored. Plain numbers need no unit, and words have none. Unknown
-    words are faults of the table. Numbers that a key does not accept are only found when their case is checked.
+    Empty lines and lines that begin with `#` are ignored. Dimensionless numbers need no unit, and strings have none.
+    An unknown string is an error in the table. A number that a key does not accept is only detected when its case is
+    checked.
 
     Parameters
     ----------
     tree : dict
-        Content of the mission file as text.
+        Content of the mission file, as strings, lists and mappings.
     text : str
         The content of the file.
     file : str
@@ -429,7 +429,7 @@ def table(tree: JsonObject, text: str, file: str) -> Cases:
     ------
     TableError
         A cell of the header is not a key with its unit, or repeats a key; a line has too few or too many cells; a
-        cell is not a number or a known word; or there are no cases, or too many. The error lists at most twenty
+        cell is not a number or a known string; or there are no cases, or too many. The error lists at most twenty
         faults.
     """
     lines = (
@@ -513,7 +513,7 @@ def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple
 
 
 def _column(tree: JsonObject, cell: str) -> Varied:
-    """Read one cell of the header of a table: a key of numbers and its unit, or a key whose values are words."""
+    """Parse one cell of the header of a table: a numeric key with its unit, or a key whose values are strings."""
     match = _KEY_HEADER_PATTERN.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
@@ -541,8 +541,8 @@ def _row(
 ) -> list[float] | Fault:
     """Read the values of one line of a table, or return the first fault of the line.
 
-    Words are replaced by numbers. `words` has a mapping from words to numbers for each column; new words are added
-    to it.
+    Strings are replaced by numbers. `words` contains a mapping from strings to numbers for each column; new strings
+    are added to it.
     """
     texts = line.split(",")
     if len(texts) != len(varied):

@@ -68,11 +68,11 @@ class PartState(NamedTuple):
 class Comparison(NamedTuple):
     """Comparison of parts of the catalogue for one key of one mission.
 
-    `parts` lists the complying parts in the order of rising margin, and then the other parts in the order of rising
-    excess. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds that stay in the mission.
-    `overridden` are figures of parts that the mission file replaces by its own. `imaged` is the verdict of images
-    with the first complying part, if images were formed. `overrides` are settings outside the mission file that
-    influence the verdict.
+    `parts` lists the complying parts in ascending order of margin, followed by all other parts in ascending order of
+    excess. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds, which remain in the
+    mission. `overridden` are figures of parts that the mission file overrides. `imaged` is the verdict of images with
+    the first complying part, if images were formed. `overrides` are settings outside the mission file that influence
+    the verdict.
     """
 
     file: str
@@ -122,8 +122,8 @@ def compare_parts(
 ) -> Comparison:
     """Check a mission with every part of the catalogue that a key can name.
 
-    A part replaces the file's part of the same kind, and parts of other kinds stay. If the file names no part, parts
-    of every kind that the key accepts are tried one at a time. The other arguments are those of `solve`.
+    Each part replaces the part of the same kind in the file; parts of other kinds are kept. If the file names no
+    part, parts of every kind that the key accepts are tried one at a time. The other arguments are those of `solve`.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def compare_parts(
     Returns
     -------
     Comparison
-        Parts in the order of their margins.
+        Complying parts in ascending order of margin, followed by all other parts.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def compare_parts(
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
     """Yield the states with `silent_on` filled in.
 
-    It has the figures that other parts of the same kind state and this part does not.
+    `silent_on` lists the figures that other parts of the same kind state and this part does not.
     """
     for state in states:
         if state.standing.status == "error":
@@ -196,10 +196,10 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 
 
 def _order(state: PartState) -> tuple[int, float, float, str]:
-    """Make the sort key of a part: complying parts come first, then waived parts, then all other parts.
+    """Return the sort key of a part: complying parts come first, then waived parts, then all other parts.
 
-    Complying parts are in the order of rising margin, and other parts in the order of rising excess. Parts without a
-    utilization, such as parts with which the mission is invalid, come last.
+    Complying parts are sorted by ascending margin, all other parts by ascending excess. Within each group, parts
+    without a utilization, such as parts with which the mission is invalid, come last.
     """
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
@@ -212,9 +212,8 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
 class _Candidate(NamedTuple):
     """A part of the catalogue to try, with the judged mission.
 
-    If the mission is invalid with this part, the reason takes the place of the judged mission. `figures` are the
-    figures that the mission takes from the part. `stated` are figures that the mission file states and that replace
-    those of the part.
+    If the mission is invalid with this part, `judged` is None and `reason` is set. `figures` are the figures that the
+    mission takes from the part. `stated` are the figures for which the mission file overrides the part.
     """
 
     id: str
@@ -227,7 +226,7 @@ class _Candidate(NamedTuple):
 
 
 class _PartSearch:
-    """Search for the parts that a key of a mission can name, with a check of the mission for each of them.
+    """Checks a mission with each of the parts that a key can name.
 
     `given` are the parts that the mission file names, and `candidates` are all parts to try. The constructor raises
     `PartError` if the catalogue cannot be read.
@@ -254,9 +253,9 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Make the text of the key's value with the part `name` in place of the file's part of the kind `kind`.
+        """Return the value of the key, as text, with the part `name` as the only part of the kind `kind`.
 
-        Parts of other kinds that the file names stay in the text.
+        Parts of other kinds that the file names are kept.
         """
         kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)

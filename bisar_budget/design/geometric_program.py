@@ -23,7 +23,7 @@ class BarrierSettings:
     gap_fraction : float
         Largest allowed distance between Σ w·x and its maximum, as a fraction of Σ w.
     firmness_factor : float
-        Factor by which the weight of the objective against the barrier grows in each round.
+        Factor by which the weight of the objective relative to the barrier grows in each round.
     max_newton_steps : int
         Largest number of Newton steps in each round; ten are usually enough.
     decrement_ratio : float

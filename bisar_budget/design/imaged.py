@@ -32,9 +32,9 @@ class ToImage(NamedTuple):
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
     """Choose the mission and the row for images at a solution.
 
-    Returns None if no value complies, if all values comply, or if no row binds. The mission is the one at the largest
-    value at which compliance ends or begins. For a comparison it is the mission with the complying part that has the
-    smallest margin.
+    Returns None if no value complies, if all values comply, or if no row binds. The mission is taken at the complying
+    side of the crossing with the largest value. For a comparison it is the mission with the complying part that has
+    the smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

@@ -27,9 +27,9 @@ class OfferedFigure(NamedTuple):
     text : str
         The figure as the file of the offer writes it.
     ordered : str
-        The ordered size, as text.
+        The specified size, as text.
     is_inside : bool, optional
-        Whether the figure meets the specification; None if the two cannot be compared, or if no size is ordered.
+        Whether the figure meets the specification; None if the two cannot be compared, or if no size is specified.
     remark : str
         Why `is_inside` is None; otherwise empty.
     """
@@ -45,7 +45,8 @@ class OfferedFigure(NamedTuple):
 class Offer(NamedTuple):
     """Result of comparing an offer with a sheet: the file of the offer, its figures, and the verdict of its mission.
 
-    `notes` name the other sections in which the mission of the offer differs from the mission of the sheet.
+    `notes` name the sections, apart from the errors, in which the mission of the offer differs from that of the
+    sheet.
     """
 
     file: str
@@ -66,9 +67,10 @@ class Offer(NamedTuple):
 def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Compare the mission of an offer with a sheet of specifications.
 
-    A figure meets its specification if it is no larger than the ordered size. If a figure has three axes, the largest
-    value counts. Figures of parts that the offer names are compared in the same way. A level shifts a spectrum, so
-    levels of different spectra cannot be compared. Specifications and waivers in the file of the offer are ignored.
+    A figure meets its specification if it is no larger than the specified size. If a figure has three axes, the
+    largest value counts. Figures of parts that the offer names are compared in the same way. A level shifts a
+    spectrum, so levels of different spectra cannot be compared. Specifications and waivers in the file of the offer
+    are ignored.
     """
     sheet_mission = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(each, sheet, mission, sheet_mission) for each in sheet.specifications)
@@ -108,7 +110,7 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """Convert the allocation rules of a mission to the form in which a sheet has them.
+    """Return the allocation rules of a mission in the form used in a specification sheet.
 
     The returned rules have no `specify`, and equal shares in place of balanced shares.
     """

@@ -1,8 +1,8 @@
 """Passes of a satellite over the scene of a mission, and the verdict of the mission in each pass.
 
-A pass lasts as long as the satellite is above a least elevation; if both platforms have orbits, both satellites must
-be above it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by default
-at broadside. The middle of the aperture is put at the mid-time, and the mission is checked like a file with this
+A pass lasts as long as the satellite is above a minimum elevation; if both platforms have orbits, both satellites
+must be above it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by
+default at broadside. The mission is checked with mid-aperture at the mid-time, as if its file stated this
 `collection.center_time`.
 """
 
@@ -49,16 +49,16 @@ class SatellitePass(NamedTuple):
     number : int
         Number of the pass, from 1.
     start, stop, culmination : Instant
-        Beginning and end of the time above the least elevation, and the time of the largest elevation.
+        Beginning and end of the time above the minimum elevation, and the time of maximum elevation.
     rises, sets : bool
-        Whether the satellite rises above and sinks below the least elevation within the span. `rises` is False if it
-        is already above at the beginning of the span, `sets` if it is still above at the end.
+        Whether the satellite rises above and sinks below the minimum elevation within the span. `rises` is False if
+        it is already above at the beginning of the span, `sets` if it is still above at the end.
     max_elevation : float
         Elevation at the culmination. [rad]
     track : (n, 2)
         Azimuth and elevation along the pass. [rad]
     center : Instant, optional
-        Mid-time, to a millisecond; None if the satellite never has the squint.
+        Mid-time, to a millisecond; None if the squint is never reached.
     state : PlatformState, optional
         State of the satellite at the mid-time, in the axes of the scene.
     side : str
@@ -66,7 +66,7 @@ class SatellitePass(NamedTuple):
     is_ascending : bool
         Whether the satellite flies north at the mid-time.
     doubt : float, optional
-        Largest possible distance of the satellite from its computed path. [m]
+        Maximum possible distance between the satellite and its computed path. [m]
     status, reason : str
         Status of the check at the mid-time, and the reason for it. The status is `error` if the mission is invalid at
         the mid-time, and `not_evaluated` if there is no mid-time.
@@ -176,12 +176,12 @@ class Passes(NamedTuple):
 
 
 def start_of(text: str) -> Instant:
-    """Read a day or an instant of UTC from a text; a day gives its beginning.
+    """Parse a UTC date or instant; a date means 00:00 UTC.
 
     Raises
     ------
     QuestionError
-        The text is neither a day nor an instant, or the year is out of range.
+        The text is neither a date nor an instant, or the year is out of range.
     """
     instant = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
     if instant is None or not _YEARS[0] <= instant.as_datetime().year < _YEARS[1]:
@@ -206,7 +206,7 @@ def passes(
 ) -> Passes:
     """Find the passes of a satellite over the scene, and check the mission in each.
 
-    Arguments are those of `bisar_budget.passes`. The least elevation and the squint are in radians; the squint is
+    Arguments are those of `bisar_budget.passes`. The minimum elevation and the squint are in radians; the squint is
     positive if the satellite looks forward. The mission may be loaded with or without the paths of its platforms. Its
     `collection.center_time` is ignored. `progress` is called with the number of checked passes and of all passes.
 
@@ -215,7 +215,7 @@ def passes(
     QuestionError
         No platform has an orbit, the scene has no position on the Earth, or there are too many days.
     MissionError
-        The orbit cannot be used at any time of the span; the fault has the line of its key.
+        The orbit cannot be used at any time of the span; the fault gives the line of its key.
     """
     if not 0 < days <= MAX_DAYS:
         raise QuestionError(f"--days {days:g}: accepted: more than 0, up to {MAX_DAYS:g}")
@@ -288,7 +288,7 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Read the mission with the middle of the aperture at an instant, to raise the error of an unusable orbit.
+    """Raise the error of an unusable orbit, if there is one, by reading the mission with mid-aperture at an instant.
 
     Nothing is raised if the mission is valid. The message does not mention the changed instant, because the user has
     not set it.
@@ -374,12 +374,12 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Make the changes to a mission file that put the middle of the aperture at an instant."""
+    """Make the changes to a mission file that set mid-aperture to an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
 def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """Add the findings of the check at the mid-time to a pass that has none yet, and return the completed pass."""
+    """Complete a pass with the findings of the check at its mid-time, and return it."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
     return unjudged._replace(
@@ -402,8 +402,8 @@ def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float 
     """Find the row, key and utilization of the requirement that decides, and the reason for the mission's status.
 
     Among the requirements that have the same status as the mission, the one with the highest utilization decides. If
-    no requirement has this status, it comes from a row or from a warning about the whole mission. The utilization is
-    None if nothing is judged.
+    no requirement has this status, the status comes from a row or from a warning about the whole mission. The
+    utilization is None if nothing is judged.
     """
     worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
     if worst.status == findings.status:

@@ -1,8 +1,8 @@
 """Utilizations of the rows of a budget for given sizes of errors, and the contribution of each error to each row.
 
 The utilization of a row is its error divided by its limit. Each row that can fail has an allowed utilization. An
-error adds a power of its size to the row: the square if errors combine by root-sum-square or powers add, the size
-itself if errors add linearly. Values are in SI and radians.
+error contributes a power of its size to the row: the square if errors combine by root-sum-square or if their powers
+add, and the size itself if errors add linearly. Values are in SI and radians.
 """
 
 import math
@@ -155,7 +155,7 @@ class SpecifiedMission:
     def with_values(self, texts: Sequence[str]) -> Mission:
         """Read the mission with a new size for each specified error.
 
-        `texts` are the sizes as texts, in the order of the specified errors. An error with an empty text is not
+        `texts` are the sizes as strings, in the order of the specified errors. An error with an empty text is not
         changed.
         """
         return self._read(
@@ -224,10 +224,10 @@ class SpecifiedMission:
         return 1.0 if is_summed or kind.only_warns else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
-        """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, less a small margin.
+        """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, reduced by a small margin.
 
-        Rows without a requirement have no reserve. A row that stands for the largest size with an image has a margin
-        of at least 0.5 %.
+        Rows without a requirement have no reserve. A row for the largest size at which an image forms has a margin of
+        at least 0.5 %.
         """
         usual = (1 - self.reserve) * _SURE_FRACTION
         most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}

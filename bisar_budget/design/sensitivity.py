@@ -79,8 +79,8 @@ class Slope(NamedTuple):
     value, unit : float, str
         The value in its unit. For a covariance the value is 1, the factor by which its sigmas are multiplied.
     per, per_text : float, str
-        Increase of the number that causes `change`. `per` is in SI and has the sign of the value; `per_text` is in
-        words.
+        Increase of the number that causes `change`. `per` is in SI and has the sign of the value; `per_text` is text
+        such as `1 dB`.
     step : float
         Step by which the number is changed, in SI. A central difference spans two steps.
     difference : str
@@ -97,8 +97,8 @@ class Slope(NamedTuple):
     part : str
         Part of the catalogue from which the number is taken; empty if the file states it.
     measure : float
-        The increase `per` as a ratio, so that numbers of all kinds can be compared: to the number itself, to a
-        radian, to a power, or to a slant range.
+        The increase `per` as a dimensionless ratio, so that numbers of all kinds can be compared. The reference is
+        the number itself, a radian, a power, or a slant range.
     """
 
     key: str
@@ -139,11 +139,12 @@ class Slope(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """Effect of one doubled error on the other errors of a mission, whose shares are then balanced again.
+    """Effect of doubling one error of a mission on its other errors, once the shares are balanced again.
 
     `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` each
-    have the worst row after the doubling, and the worst utilization before and after it. Only judged rows of other
-    errors are included. A platform without such rows has None.
+    contain the worst row of the platform after the doubling, and the worst utilization of the platform before and
+    after it. Only judged rows of errors that are not doubled are included. The value is None for a platform without
+    such rows.
     """
 
     key: str
@@ -219,12 +220,12 @@ class Sensitivity(NamedTuple):
 
 # ---------------------------------------------------------------- differences
 class Stated(NamedTuple):
-    """A number of the mission file that is varied; `text` is the number as the file states it.
+    """A number of the mission file that the analysis varies; `text` is the number as the file states it.
 
     `step` is half of the central difference. `per` is the increase for which effects are given, in SI, and `per_text`
-    is this increase in words. `part` is this increase as a ratio to the number itself, to a radian, to a power, or to
-    the smaller slant range. `others` are further numbers that change with this one: the other shares, because all
-    shares sum to 1. For a covariance the value is a factor by which all sigmas are multiplied.
+    is the same increase as text. `part` is this increase as a dimensionless ratio to the number itself, a radian, a
+    power, or the smaller slant range. `others` are further numbers that change with this one: the other shares of its
+    section, because all shares sum to 1. For a covariance the value is a factor by which all sigmas are multiplied.
     """
 
     number: Number
@@ -253,16 +254,18 @@ def sensitivity(
 ) -> Sensitivity:
     """Compute the effect of each number of a mission on its worst utilization.
 
-    The numbers are all that the file states or takes from a part. Each number is changed alone, to both sides, and
-    the mission is checked again in full, so that no effect is left out. Effects are given for a change by 1 % of the
-    number, by a degree for directions, by a decibel for levels, and by 1 % of the smaller slant range for latitudes
-    and longitudes. Arguments are those of `solve`. With a `row`, effects on its utilization are computed too.
+    All numbers that the file states or takes from a part are considered. Each is changed alone, in both directions,
+    and the mission is checked again in full, so that no effect is left out. Effects are given for a change by 1 % of
+    the number, by a degree for directions, by a decibel for levels, and by 1 % of the smaller slant range for
+    latitudes and longitudes. Arguments are those of `solve`. With a `row`, effects on its utilization are computed
+    too.
 
     Returns
     -------
     Sensitivity
         Effects as changes of utilization; 0.01 is 1 % of a limit. The number that uses up the margin with the
-        smallest change comes first. For this order, changes are fractions of a number, a radian, a power, or a range.
+        smallest change comes first. For this comparison, changes are expressed as fractions of a number, a radian, a
+        power, or a range.
 
     Raises
     ------
@@ -332,9 +335,9 @@ class _Uses(NamedTuple):
 
     @property
     def is_passed(self) -> bool:
-        """Whether another row is now worse than the row that is the worst with the numbers of the file.
+        """Whether the row that is worst with the numbers of the file is no longer the worst row.
 
-        Differences by rounding do not count.
+        Rounding differences are ignored.
         """
         return self.worst - self.of_worst > _UTILIZATION_ROUNDING_FRACTION * self.worst
 
@@ -411,7 +414,7 @@ class _Neighbours:
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
-        """Compute the slope of a number: a weighted sum of the utilizations `uses` at rising values of the number.
+        """Compute the slope of a number: a weighted sum of the utilizations `uses` at ascending values of the number.
 
         `kind` is the kind of difference: `central`, `forward` or `backward`.
         """
@@ -441,8 +444,8 @@ class _Neighbours:
 def stated_numbers(tree: JsonObject, nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
     """Find all numbers of a mission file that can be varied, in the order of the file, and the skipped keys.
 
-    `tree` is the content of the file as text. A latitude or longitude changes by a fraction of `nearest_m`, the slant
-    range of the nearer platform. [m]
+    `tree` is the content of the file, as strings, lists and mappings. A latitude or longitude changes by a fraction
+    of `nearest_m`, the slant range of the nearer platform. [m]
     """
     numbers: list[Stated] = []
     skipped: list[Skipped] = []
@@ -488,7 +491,7 @@ def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above:
 def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
     """Choose the step by which a number is varied, or return the reason why the number cannot be varied.
 
-    `shares` are all shares of the section of the number; None if the number is no share.
+    `shares` are all shares of the section of the number; None if the number is not a share.
     """
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
@@ -517,7 +520,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, ob
 def _no_number(key: str, reader: Reader[object]) -> str:
     """Explain why the value of a key is not varied.
 
-    The text is empty for names and remarks, which have no effect on the verdict.
+    The result is empty for names and remarks, which have no effect on the verdict.
     """
     kinds = (
         ("is a whole number", isinstance(reader, Whole | Version)),

@@ -84,7 +84,7 @@ class State(NamedTuple):
     """Verdict of the mission at one value of the number.
 
     `row` has the highest utilization of the rows that decide; `requirement` sets its allowable. Both are None if no
-    row is judged. `reason` tells why there is no mission at this value; it is empty if there is a mission.
+    row is judged. `reason` explains why the mission is invalid at this value; it is empty if the mission is valid.
     `waived_by` are the ids of the waivers of a waived state, which does not comply. Resolutions are from peak to
     first null on the ground. [m]
     """
@@ -133,7 +133,7 @@ class Imaged(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Result of `solve`: the crossings of one mission in a range, in rising order.
+    """Result of `solve`: the crossings of one mission in a range, in ascending order.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class Solution(NamedTuple):
     is_constant : bool
         Whether the number has no effect on the utilization that decides.
     skipped, waived : int
-        Number of samples without a mission, and number of waived samples.
+        Number of samples with an invalid mission, and number of waived samples.
     waived_by : tuple of str
         Ids of the waivers of waived samples.
     texts : mapping of float to str
@@ -342,7 +342,7 @@ class _Search:
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
         """Find the states at the samples, and at maxima and minima of the utilization where compliance changes.
 
-        Returns these states in rising order, and the state at the value of the file, or None without such a value.
+        Returns these states in ascending order, and the state at the value of the file, or None without such a value.
         """
         values = self.range.places(
             SOLVE_SETTINGS.circle_samples if self.range.is_circle else SOLVE_SETTINGS.range_samples
@@ -418,7 +418,7 @@ class _Search:
             states_by_value.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
-        """Write all values of the solution as texts for a mission file; returns the texts by value."""
+        """Write all values of the solution as strings for a mission file; returns the strings by value."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]

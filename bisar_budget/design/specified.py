@@ -1,4 +1,4 @@
-"""Errors to specify: their keys, the units of their ordered sizes, and the parts that meet a specification."""
+"""Errors to specify: their keys, the units of their specified sizes, and the parts that meet a specification."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -97,7 +97,7 @@ class Specified(NamedTuple):
         return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
-        """Choose the unit in which a number is ordered: the unit of the file, or else a unit that suits the size."""
+        """Choose the unit in which a number is specified: that of the file, or else a unit that suits the size."""
         dimension = self.number.dimension
         if self.number.value is not None or dimension not in _ORDERED_IN:
             return self.number.unit
@@ -105,13 +105,13 @@ class Specified(NamedTuple):
         return next((unit for unit in candidates if abs(value) >= np.divide(*dimension.scales[unit])), candidates[-1])
 
     def said(self, value: float) -> str:
-        """Write a number as text with four digits, in the unit in which it is ordered."""
+        """Write a number as text with four digits, in the unit in which it is specified."""
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         return f"{value / factor * divisor:.4g} {unit}".rstrip()
 
     def ordered(self, value: float) -> tuple[float, str]:
-        """Round a number down to two digits in the unit in which it is ordered.
+        """Round a number down to two digits in the unit in which it is specified.
 
         Returns the rounded number in SI, and its text as in a mission file.
         """
@@ -215,7 +215,7 @@ def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
 def catalogue(mission: Mission) -> list[Entry]:
     """List the parts that a mission file may name: the parts of this package and of the mission's project.
 
-    The list is empty if a file of the project is no valid part.
+    The list is empty if a file of the project is not a valid part.
     """
     try:
         return list(entries(folders(folder_of(mission.file))))
@@ -224,13 +224,13 @@ def catalogue(mission: Mission) -> list[Entry]:
 
 
 def suitable_parts(mission: Mission, specified: Specified, most: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Yield the ids of the parts that meet a specification with the ordered number `most`.
+    """Yield the ids of the parts that meet a specification whose largest permitted value is `most`.
 
     `mission` must state the error. A sensor meets the specification if its figure of the same name is no larger on
-    any axis. An oscillator meets it if its phase noise, converted to the same frequency, is nowhere above the ordered
-    spectrum; an oscillator without noise values at some offsets does not meet it. For a satellite only sensors that
-    work in orbit are listed: export rules stop receivers for ground and air use at 515 m/s or 18 km, and inertial
-    sensors measure nothing in free fall.
+    any axis. An oscillator meets it if its phase noise, converted to the same frequency, is nowhere above the
+    specified spectrum; an oscillator without noise values at some offsets does not meet it. For a satellite only
+    sensors that work in orbit are listed: export rules stop receivers for ground and air use at 515 m/s or 18 km, and
+    inertial sensors measure nothing in free fall.
     """
     *above, section, figure = parts_of(specified.key)
     if section == "oscillator" and figure == "level":
@@ -250,7 +250,7 @@ def _is_satellite(platform: Platform) -> bool:
 
 
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Yield the ids of the oscillators that meet an ordered level of phase noise [dB].
+    """Yield the ids of the oscillators that meet a specified level of phase noise [dB].
 
     `name` is the name of the platform. The phase noise of a listed oscillator is nowhere above the spectrum of the
     platform's oscillator, shifted by `level`.
@@ -272,9 +272,9 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Se
 
 
 def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
-    """Write the phase noise of an oscillator at an ordered level [dB] as text.
+    """Write the phase noise of an oscillator at a specified level [dB] as text.
 
-    The text is empty if the specified error is not the level of an oscillator.
+    The result is empty if the specified error is not the level of an oscillator.
     """
     _, name, *below = parts_of(specified.key)
     if below != ["oscillator", "level"]:

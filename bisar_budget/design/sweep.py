@@ -63,9 +63,9 @@ _UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's na
 
 
 class Asked:
-    """A sweep that is requested: a mission, and the cases in which it is checked.
+    """A requested sweep: a mission, and the cases in which it is checked.
 
-    Arguments are those of `bisar_budget.sweep`. A column that is named several times is used once.
+    Arguments are those of `bisar_budget.sweep`. A column that is named repeatedly is used only once.
 
     Raises
     ------
@@ -98,15 +98,15 @@ class Asked:
                 self._hold_to_a_mission(number)
 
     def _chosen(self) -> Iterator[Mission]:
-        """Yield one mission for each word of each varied key, in which only this key is changed.
+        """Yield the mission with each string value of each varied key, changing one key at a time.
 
-        Words with which the mission is invalid are left out.
+        Values with which the mission is invalid are left out.
 
         Raises
         ------
         QuestionError
-            A word is invalid by itself, such as a part that is not in the catalogue. Or the mission is invalid with
-            every word of a key, for the same reason.
+            A value is invalid by itself, such as a part that is not in the catalogue. Or the mission is invalid with
+            every string value of a key, for the same reason.
         """
         for choices, words in words_of(self.cases):
             problems = set()
@@ -190,7 +190,7 @@ class Asked:
     def chunks(self) -> "Chunks":
         """The cases divided into chunks, which are checked one at a time.
 
-        Chunks are smaller if many cases of a sample cannot be checked as arrays, but have to be read one by one.
+        Chunks are smaller if many cases in a sample have to be read one by one, because arrays cannot represent them.
         """
         cases, is_slow = self.cases, False
         if cases.count > _READ_PART_CASES:

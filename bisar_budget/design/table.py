@@ -2,7 +2,7 @@
 
 If no other content of the mission depends on a varied number, an array with the values of all cases replaces the
 number. Otherwise each case is read like a mission file with the numbers of the case, and missions of the same
-structure are then joined into one mission with arrays. In both ways all cases are judged together. Only this module
+structure are then joined into one mission with arrays. Either way, all cases are judged together. Only this module
 decides which row is the worst.
 """
 
@@ -41,7 +41,7 @@ _FIRST_REPORTS, _REPORT_INTERVAL_CASES = (2, 12), 48
 
 
 class Column(NamedTuple):
-    """One column of a table: its name, its SI unit (empty for texts and plain numbers) and its description."""
+    """One column of a table: its name, its SI unit (empty for strings and plain numbers) and its description."""
 
     name: str
     unit: str
@@ -58,7 +58,7 @@ class Part(NamedTuple):
     """Results for the cases `start` to `stop` - 1 of a table, in their order.
 
     `values` has an array (stop - start,) for each column, by the name of the column. Numbers are float64, with NaN
-    for missing values; texts are empty for missing values.
+    for missing values; strings are empty for missing values.
     """
 
     start: int
@@ -116,8 +116,8 @@ def _verdict(
     The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
     first one. A row that is not evaluated and has no utilization cannot be the binding row. If the mission does not
     comply, the binding row is one of the rows that break a limit, and a waived row only if no other row breaks one.
-    If the verdict of a case is `not_evaluated`, its utilization is NaN: a missing evaluation decides the verdict, and
-    not the utilization of a row.
+    If the verdict of a case is `not_evaluated`, its utilization is NaN: the missing evaluation decides the verdict,
+    not the utilization of any row.
     """
     rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     if not rows:
@@ -164,9 +164,9 @@ def _verdict(
 
 
 def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -> Values:
-    """Make one text for each case with the ids of the waivers that apply to it, (cases,).
+    """Return, for each case, a string with the ids of the waivers that apply to it, (cases,).
 
-    The ids are those that the file writes. The text is empty if the case is not waived.
+    Ids are written as in the mission file. The string is empty if the case is not waived.
     """
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
@@ -230,8 +230,8 @@ def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> No
 class Variation:
     """A mission that can be read again with changed values, which are checked like the values of a file.
 
-    Values that options of the command line have changed stay changed. `model` replaces the gating model of the
-    mission. `named` has the content of the files that the mission names, for machines without these files.
+    Values changed by command-line options stay changed. `model` replaces the gating model of the mission. `named` has
+    the content of the files that the mission names, for machines without these files.
     """
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
@@ -260,9 +260,9 @@ class Variation:
 class Question(NamedTuple):
     """Everything that a process needs to check cases of a mission.
 
-    `keys` are the varied keys with numbers, and `choices` are the varied keys with words. If `row` is set, this row
-    is judged instead of the whole mission. A case with a status in `breaks` does not comply. `named` holds the files
-    that the mission names, for a process that cannot read them itself.
+    `keys` are the varied keys with numerical values, and `choices` are the varied keys with string values. If `row`
+    is set, this row is judged instead of the whole mission. A case with a status in `breaks` does not comply. `named`
+    holds the files that the mission names, for a process that cannot read them itself.
     """
 
     data: bytes
@@ -368,9 +368,9 @@ class Table:
 
     # ---------------------------------------------------------------- one mission for the same words
     def _by_words(self, columns: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
-        """Yield a table for each combination of words, with the indices of its cases.
+        """Yield a table for each combination of string values, with the indices of its cases.
 
-        If the mission is invalid in all cases with a combination, no table is yielded. The status and the reason of
+        A combination with which the mission is invalid in all cases yields no table. The status and the reason of
         these cases are written into `columns`.
         """
         indices_by_words: dict[tuple[str, ...], list[int]] = {}
@@ -423,7 +423,7 @@ class Table:
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
-            """Read the missions of the cases that need it, one by one; their indices are added to `read_indices`."""
+            """Read the missions that arrays cannot represent, one by one; adds their indices to `read_indices`."""
             for index in np.delete(np.arange(cases), indices).tolist():
                 mission = self._read(columns, index)
                 if mission is not None:

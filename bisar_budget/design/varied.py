@@ -58,11 +58,11 @@ SAFETY_FACTOR = 1 + 1e-6  # around a limit of image formation within which a cas
 
 
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
-    """Whether an array, with one value for each case, can replace the number with a key.
+    """Whether an array with one value for each case can replace the number of a key.
 
     `is_stated` tells whether the file states the number. An array cannot replace a number from which other content of
-    the mission follows. Such numbers belong to an orbit or a log, to the position of the scene on the Earth, to the
-    orientation of the Earth, or to a covariance matrix.
+    the mission is derived. Such numbers belong to an orbit or a log, to the position of the scene on the Earth, to
+    the orientation of the Earth, or to a covariance matrix.
     """
     section, *steps = parts_of(key)
     if section == "platforms":
@@ -154,7 +154,7 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether the numbers whose bounds depend on other numbers are valid in each case, with a margin, (cases,).
+    """Whether all numbers with interdependent bounds are valid in each case, with a margin, (cases,).
 
     These numbers are the shares of a budget, the bandwidth and the noise mask of an oscillator, the correlations of a
     covariance, and the age of a holdover.

@@ -1,4 +1,4 @@
-"""Random delays in the air: after correction, the path from each platform to the scene is longer than assumed.
+"""Random atmospheric delays left after correction: the path from each platform to the scene is longer than assumed.
 
 A leg is the path between a platform and the scene. Its delay is the zenith delay times a factor. The factor depends
 on the elevation of the platform above the scene. The elevation changes over the aperture, and so does the delay.
@@ -45,7 +45,7 @@ DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: PerCase) -> PerCase:
-    """Ratio of the path length that a leg has in a thin shell of the air to the path length at the zenith.
+    """Ratio of the path length of a leg in a thin atmospheric shell to the length of a vertical path through it.
 
     A leg is the path between a platform and the scene. The ratio is exact for a spherical Earth.
 
@@ -154,7 +154,7 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Platforms whose legs have a delay that belongs to the given owner: a platform, or `mission` for both legs."""
+    """Names of the platforms whose legs share a delay of `owner`: one platform, or both for the owner `mission`."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 

@@ -202,7 +202,7 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ..
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:
-    """Most probable values of the six errors of a covariance if together they cause the phase √(gᵀCg), (6,).
+    """Most probable values (6,) of the six errors of a covariance, given that they together cause the phase √(gᵀCg).
 
     `members` are the six errors in the order of the covariance. The values are Cg/√(gᵀCg). The phase is the
     first-order quadratic phase of the full model. The values are along the axes of the covariance's frame, in SI

@@ -65,12 +65,12 @@ class Declared(NamedTuple):
 
     `displacement` is the displacement east and north for the declared sign of the error. `opposite` is the
     displacement for the opposite sign. [m] Both are NaN (None in one case) for a pure phase error, and in the
-    published model if Q has no inverse. A displacement is also NaN if, for its sign, no ground point has the range
-    history. The phases are then infinite.
+    published model if Q has no inverse. A displacement is also NaN if no ground point has the range history that the
+    error of that sign causes. The phases are then infinite.
 
-    `hidden` is the hidden phase: the quadratic phase that lowers the peak as much as the range error that no
-    displacement can remove, because the bandwidth and the turn of the line of sight do not resolve it. [rad]
-    Autofocus does not correct it.
+    `hidden` is the hidden phase, which autofocus does not correct. [rad] Part of the range error cannot be removed by
+    any displacement, because the bandwidth and the turn of the line of sight do not resolve it. The hidden phase is
+    the quadratic phase that lowers the peak as much as this part does.
     """
 
     qpe: Any
@@ -99,9 +99,9 @@ class Declared(NamedTuple):
     def farthest(self) -> Any:
         """Displacement, east and north, for the sign of the error that moves the image farther. [m]
 
-        If the opposite of the declared sign moves the image farther, the displacement for that sign is returned with
-        its direction reversed. The result is NaN if the displacement for either sign is NaN, and None if either is
-        None.
+        If the opposite sign moves the image farther than the declared sign, the displacement for the opposite sign is
+        returned, with its direction reversed. The result is NaN if the displacement for either sign is NaN, and None
+        if either is None.
         """
         if self.displacement is None or self.opposite is None:
             return None
@@ -272,9 +272,9 @@ class ErrorBlock:
         return phases
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
-        """Range error at the nodes that remains at the first-order image point, (errors, nodes, cases). [m/unit]
+        """Range error that remains at the nodes if the image is at its first-order position. [m/unit]
 
-        `indices` are the indices of the errors in the block.
+        The result is (errors, nodes, cases). `indices` are the indices of the errors in the block.
         """
         full = self.effects["full"]
         if self.cases == 1:
@@ -286,7 +286,7 @@ class ErrorBlock:
         return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
-        """Upper bounds of the second-order parts of the effects of errors of the given sizes, (3, errors, cases).
+        """Upper bounds of the second-order effects of errors with the given sizes, (3, errors, cases).
 
         The effects are the judged phase [rad], the cubic phase [rad] and the displacement [m].
         """
@@ -297,9 +297,9 @@ class ErrorBlock:
         """Upper bound of the distance between the image point and its first-order position, (errors, cases). [m]
 
         An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. If this
-        change varies over the aperture like the remaining range error ρ, the minimum of the phase variance V is
-        displaced from the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges` defines V, H
-        and ⟨ ⟩.
+        change varies over the aperture in the same way as the remaining range error ρ, the minimum of the phase
+        variance V is displaced from the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges`
+        defines V, H and ⟨ ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, beyond_cubic = self.hidden_per_unit
@@ -311,9 +311,9 @@ class ErrorBlock:
     def _bent(self, size: Floats) -> PerCase:
         """Upper bound of the part of a platform's motion that is not proportional to the error's size. [m]
 
-        Only a time tag error has such a part: its motion follows the path, which may turn. The bound is the distance
-        from `DeclaredErrors.bent`, (errors, cases). It is doubled if the direct path synchronizes the clocks. The
-        result is the number 0 if the block has no time tag error.
+        Only a time tag error has such a part, because the platform is displaced along its path, which may be curved.
+        The bound, (errors, cases), is the distance that `DeclaredErrors.bent` returns, doubled if the direct path
+        synchronizes the clocks. The result is the number 0 if the block has no time tag error.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
@@ -329,13 +329,13 @@ class ErrorBlock:
         `strays` is the upper bound from `_strays`. [m]
 
         Let r̃ be the motion of a platform, x̂ the displacement of the image, and P⊥ the projection across the line of
-        sight. The second order for both platforms is −Σ|P⊥(r̃ − x̂)|²/2R. Its magnitude is at most |r̃ − x̂|²/R, with
-        the range R of the nearer platform.
+        sight. The second-order term of the range error, summed over both platforms, is −Σ|P⊥(r̃ − x̂)|²/2R. Its
+        magnitude is at most |r̃ − x̂|²/R, with the range R of the nearer platform.
 
-        With a direct path the second order of the ranges is bounded separately for each platform, because for a
-        distant platform much of it cancels to first order. The second order of the distance D between the platforms,
-        |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore not larger than the larger of both
-        terms.
+        With a direct path, the second-order term of the ranges is bounded separately for each platform, because for a
+        distant platform much of it cancels to first order. The second-order term of the distance D between the
+        platforms, |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore at most that of the larger
+        term.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -418,12 +418,12 @@ class ErrorBlock:
             east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
     def followed(self, errors: Booleans, sizes: Floats) -> Floats:
-        """Effects, from exact ranges, of the n errors that are marked in `errors`, for each sign.
+        """Effects of the n errors marked in `errors`, for each sign, computed from exact ranges.
 
-        `sizes` (n,) are the magnitudes of their sizes.
+        `sizes` (n,) are the magnitudes of the errors.
 
-        Returns an array (2, rows, n): first the positive, then the negative sign of the errors. The rows are those of
-        `point_paths.ROWS`. They are NaN where no ground point has the range history.
+        Returns an array (2, rows, n). The first axis is the sign of the errors, positive first. The rows are those of
+        `point_paths.ROWS`. Values are NaN where no ground point has the range history.
         """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -432,7 +432,7 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Index of the lane that an error with positive sign has in each case, (errors, cases).
+        """Index of the lane of each error with positive sign in each case, (errors, cases).
 
         A lane is one error with one sign in one case. The lanes of an error's negative sign follow those of its
         positive sign.
@@ -712,11 +712,10 @@ class DeclaredErrors:
         return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Largest distance between the shift by a time tag error and the first-order part of the shift, (cases,). [m]
+        """Maximum deviation of the shift by a time tag error from its first-order part, (cases,). [m]
 
-        The distance is the largest within the aperture. The first-order part is the size of the error times the
-        velocity. The result is for the worse sign of the error. For an error of both platforms, the largest distances
-        of both are added.
+        The maximum is taken over the aperture and over both signs of the error. The first-order part is the size of
+        the error times the velocity. For an error of both platforms, the maxima of both are added.
         """
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
