@@ -40,10 +40,11 @@ class ErrorKind:
     Attributes
     ----------
     name : str
-        Word for the kind in row ids, in the mission file, and in the key `requirements.declare` of that file.
+        Name of the kind in row ids, in the mission file, and in the key `requirements.declare` of this file.
     id_form : str
         Form of the row ids, with the fields `{owner}`, `{kind}`, `{axis}` and `{entry}`. Empty parts are left out.
-        The owner is what has the error, such as a platform. The owner `clock` is written `timing`.
+        The owner is the part of the system that has the error, such as a platform. The owner `clock` is written
+        `timing`.
     common_id_form : str
         Form of the row ids of an error that both platforms share; empty if the kind has no such error.
     is_computed : bool
@@ -107,8 +108,8 @@ class SourceKind(ErrorKind):
     flown_as : str
         Field of the simulator's `PathError` that takes the size of the error; empty if the error has no such field.
     drawn_as : str
-        What is drawn of a random error over time: the `motion` of platforms, or the `delay` or `phase` of the echoes.
-        Empty if nothing is drawn.
+        Quantity that is drawn over time for a random error: the `motion` of platforms, or the `delay` or `phase` of
+        the echoes. Empty if nothing is drawn.
     is_random : bool
         Whether the error is random: it has a sigma and no sign.
     is_correlated : bool
@@ -118,11 +119,11 @@ class SourceKind(ErrorKind):
     is_of_log : bool
         Whether the error is the noise of a log of a flight, whose file is the source of the error.
     owes_source : bool
-        Whether a report names a declared error of the kind that has no source.
+        Whether reports list a declared error of the kind if the file states no source for it.
     is_largest_of_axes : bool
         Whether the declared size is described as the largest of three axes.
     direction : str
-        Word for the direction of the error, if its ids have no axis for it.
+        Name of the direction of the error, if its ids have no axis for it.
     """
 
     moves: str
@@ -144,7 +145,7 @@ class SourceKind(ErrorKind):
 
     @property
     def has_covariance(self) -> bool:
-        """Whether a covariance in the file can state the error."""
+        """Whether the file can state this error by a covariance."""
         return False
 
 
@@ -162,7 +163,7 @@ class StateKind(SourceKind):
 
     @property
     def has_covariance(self) -> bool:
-        """Whether a covariance in the file can state the error: that of position and velocity."""
+        """Whether the file can state this error by a covariance, which is so for position and velocity errors."""
         return self.order < 2
 
 
@@ -287,12 +288,12 @@ def _words_of(error: BaseException) -> str:
 
 
 def register(kind: MotionKind) -> None:
-    """Add a kind of error to those that every command knows.
+    """Register a kind of error, so that every command accepts it.
 
     Raises
     ------
     TypeError
-        The object is no `MotionKind`. Only a motion says everything about a kind.
+        The object is not a `MotionKind`; only the motion describes a kind completely.
     ValueError
         Another kind with the same name is registered.
     """

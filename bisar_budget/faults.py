@@ -1,4 +1,4 @@
-"""Faults of input files, with all that is needed to correct them: place, problem, given and accepted values."""
+"""Faults of input files, with the details needed to correct them: location, problem, given and accepted values."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -31,9 +31,8 @@ class Region(NamedTuple):
 class Place(int):
     """Line of a value in a file, counted from 1, together with the region of the value.
 
-    A place is itself the line number, for code that needs only that. Reports for editors and pull requests use the
-    region.
-    `text` is the value as written in the file; it is empty for a mapping or a list.
+    A `Place` is an integer, the line number, for code that needs only the line. Reports for editors and pull requests
+    use the region. `text` is the value as written in the file; it is empty for a mapping or a list.
     """
 
     region: Region
@@ -62,20 +61,20 @@ class Place(int):
 
 
 def printable(text: str) -> str:
-    """Write a user's text on one line, without control characters that affect a terminal."""
+    """Return a user's text on one line, without control characters that affect a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(text: str) -> str:
-    """Write a value from a file as short text, without control characters that affect a terminal."""
+    """Format a value from a file as a short string, without control characters that affect a terminal."""
     text = printable(text[:61])
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "") -> str:
-    """Write `what is wrong (got value); what is accepted. Hint`; all but the first part may be empty."""
+    """Format a fault as `what is wrong (got value); what is accepted. Hint`; all but the first part may be empty."""
     text = problem
     if given:
         text += f" (got {given})"
@@ -85,7 +84,7 @@ def fault_words(problem: str, given: str = "", accepted: str = "", hint: str = "
 
 
 def sentences(*texts: str) -> str:
-    """Join texts as sentences: each but the last gets a full stop, unless it ends with a question mark."""
+    """Join strings as sentences: each but the last gets a full stop, unless it ends with a question mark."""
     joined = ""
     for text in filter(None, texts):
         joined = f"{closed(joined)} {text}" if joined else text
@@ -93,7 +92,7 @@ def sentences(*texts: str) -> str:
 
 
 def closed(text: str) -> str:
-    """Add a full stop to a text, unless it ends with a full stop or a question mark."""
+    """Add a full stop to a string, unless it ends with a full stop or a question mark."""
     return text if text.endswith((".", "?")) else f"{text}."
 
 
@@ -118,8 +117,8 @@ _BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # keys with these units have sev
 class SetNumber(SetValue):
     """Number in SI units, with its text, that replaces a value of the mission, for example in one case of a sweep.
 
-    Code that reads the mission uses `value`, and messages show `text`. `value` is the number; for a key that accepts
-    quantities of several dimensions, it is the text.
+    Code that reads the mission uses `value`, and messages show `text`. `value` is the number, or the text if the key
+    accepts quantities of several dimensions.
     """
 
     value: float | str
@@ -133,7 +132,7 @@ class SetNumber(SetValue):
 
 
 class Changed:
-    """Stand-in for the event of the YAML parser, for a value that an option gives.
+    """Substitute for an event of the YAML parser, for a value from an option.
 
     Such a value has no line in a file.
     """
@@ -142,9 +141,9 @@ class Changed:
 
 
 def changes_words(changes: Sequence[SetValue]) -> str:
-    """Write the options that changed a mission, as on the command line.
+    """Format the options that changed a mission as on the command line.
 
-    The text is empty if no option changed the mission.
+    The result is an empty string if no option changed the mission.
     """
     if not changes:
         return ""
@@ -216,7 +215,7 @@ def file_fault(problem: str, hint: str = "") -> Fault:
 
 
 class ClusterError(Exception):
-    """The workers of a cluster, or a folder of partial results, cannot be used; the message has reason and remedy."""
+    """Cluster workers, or a folder of partial results, cannot be used; the message gives reason and remedy."""
 
 
 class WorkerLostError(Exception):

@@ -805,7 +805,7 @@ class DeclaredErrors:
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Note on the reason why a model gives no displacement of the image in a case.
+        """Note explaining why a model gives no displacement of the image in a case.
 
         Empty if the model gives a displacement.
         """
@@ -869,7 +869,7 @@ class Model:
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Note on the reason why no size of an error reaches a limit of the quadratic phase."""
+        """Note explaining why no size of an error reaches a limit of the quadratic phase."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
@@ -922,7 +922,7 @@ class Model:
     def ends_image(self, source: ErrorSource, size: float) -> bool:
         """Whether an error that is larger than the given allowable size leaves no image.
 
-        An earlier search must have found the size. Always false in the published model.
+        `size` must be the result of an earlier search. Always false in the published model.
         """
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
@@ -942,12 +942,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether the second-order bounds show that the effects of an error are proportional to its given size."""
+        """Whether the effects of an error of a given size are proportional to it, by the second-order bounds."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement by an error of a signed size, from exact ranges; None if no image point is left."""
+        """Phases and displacement due to an error of a signed size, from exact ranges; None if no image forms."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -956,11 +956,11 @@ class Model:
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
-        """Largest magnitude at the nodes of the first-order range error at the scene centre. [m/unit]"""
+        """Largest magnitude, over the nodes, of the first-order range error at the scene centre. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
     def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
-        """Range error at the nodes that an error of a given size leaves at a ground point, (nodes,). [m]
+        """Range error that remains at a ground point with an error of a given size, at the nodes, (nodes,). [m]
 
         `point` is the ground point, east and north of the scene centre. [m]
         """
@@ -969,7 +969,7 @@ class Model:
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """First-order range error at the nodes that an error leaves at its image point, (nodes,). [m]
+        """First-order range error that remains at the image point of an error, at the nodes, (nodes,). [m]
 
         `size` is the size of the error in its unit.
         """

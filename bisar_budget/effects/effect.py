@@ -36,11 +36,11 @@ MOTION = tuple(kind.name for kind in STATE_KINDS)
 class Subject(NamedTuple):
     """Subject of a row or an error: owner, kind and axis.
 
-    The function `subject` creates it together with its id. Code reads these fields and never parses an id. `owner`
-    owns the share of the budget that the error uses. It is transmitter, receiver or clock, or mission if no part of
-    the system owns the error. `kind` is the name of a kind in `error_kinds`: a kind of error, such as position,
-    velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a kind of sum, such as
-    dispersion or specification.
+    The function `subject` creates a subject together with its id. Code reads the fields and never parses an id.
+    `owner` owns the share of the budget that the error uses. It is transmitter, receiver or clock, or mission if no
+    part of the system owns the error. `kind` is the name of a kind in `error_kinds`: a kind of error, such as
+    position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a kind of sum,
+    such as dispersion or specification.
 
     The meaning of `axis` depends on the kind. It is the axis of `frame`, the term of the clock, the name of a
     declared value of a sensor or of the air, the name of an error determined elsewhere, the specified key, or the
@@ -81,9 +81,9 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Notes on values of a part, such as a sensor, that a key of the mission file replaces; one note per value.
+    """One note for each value of a part, for example of a sensor, that a key of the mission file overrides.
 
-    `figures` are the keys of the values to include. Without any key, all values in `overridden` are included.
+    `figures` are the keys of the values to include. By default, all values in `overridden` are included.
     """
     return tuple(
         phrases.note("overrides-a-part", key=f"platforms.{platform}.{figure.key}", text=figure.text, part=figure.part)
@@ -123,10 +123,10 @@ class ErrorSource(NamedTuple):
     root-sum-squares include only such errors. An error stated along the track is therefore not counted again by its
     components along the scene's axes.
 
-    `direction` is a unit vector in the axes of the scene, or zero for an error that is no motion. For an error of the
-    mission, `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own. The
-    direction of a time tag error is the velocity at the nodes of the aperture, (nodes, cases), along which a small
-    time tag error moves the platform. [m/s]
+    `direction` is a unit vector in the axes of the scene, or zero for an error that is not a motion. For an error of
+    the mission, `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own.
+    The direction of a time tag error is the velocity at the nodes of the aperture, (nodes, cases), along which a
+    small time tag error moves the platform. [m/s]
 
     `clock` has the coefficients t̃₀ … t̃₃ of one unit of a clock error. They are zero if synchronization removes the
     error. `clock` is None for any other error.
@@ -137,8 +137,8 @@ class ErrorSource(NamedTuple):
     kind, which moves its platform by `shifts` whether the platform is in free fall or not.
 
     `rates` are velocities at mid-aperture per unit of a position error in the frame `ric`, if a platform is in free
-    fall. Such an error has no velocity relative to the stars, so it has a velocity in the axes of the scene.
-    [(m/s)/unit] `rates` is None for all other errors.
+    fall. Such an error has no velocity in inertial space, and therefore has a velocity in the axes of the scene,
+    which rotate with the Earth. [(m/s)/unit] `rates` is None for all other errors.
     """
 
     subject: Subject
@@ -288,7 +288,7 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name of the gradients of range and Doppler from which a model forms Q_i: as printed in the paper, or true."""
+    """Name of the range and Doppler gradients that a model uses for Q_i: as printed in the paper, or true values."""
     return PRINTED if model == "published" else TRUE
 
 

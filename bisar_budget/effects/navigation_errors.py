@@ -1,20 +1,21 @@
 """Random navigation errors: errors of inertial sensors, lever arms, and noise of a position.
 
 A bias of an inertial sensor is a constant error over the aperture. Noise is an independent error at every moment. The
-motion errors that both cause are zero at mid-aperture, because the mission declares the position and velocity errors
-at that moment separately, as aiding leaves them. A tilt also rotates the lever arm, if the file states an arm. An
-attitude error rotates the arm over the whole aperture, mid-aperture included.
+motion errors that both cause are zero at mid-aperture, because the mission separately declares the position and
+velocity errors that remain at that moment after aiding. A tilt also rotates the lever arm, if the file states an arm.
+An attitude error rotates the arm over the whole aperture, mid-aperture included.
 
 A lever arm leads from the reference point of the navigation to the antenna's phase centre, in axes that turn with the
 body. These axes are along, cross and up of the velocity at every moment of the aperture; for a platform at rest they
 are the scene's axes. The antenna's position is the navigation's position plus R(τ)·l, with the arm l and the rotation
 R of the body. An error δl of the arm turns with the body, R(τ)·δl. It displaces the image, and defocuses it if the
 body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction in space, like the
-error of a strapdown navigation with perfect gyros. It does so as well when it acts on the specific force. A gyro bias
-ε makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
+attitude error of a strapdown system with perfect gyros; this also holds where ψ acts on the specific force. A gyro
+bias ε makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
 
 The same ψ acts through the specific force and through the arm, so the row for an error of an inertial sensor includes
-both effects. A further row shows the effect of attitude through the arm alone; it is part of no sum. Derived here.
+both effects. A further row shows the effect of attitude through the arm alone; it is not included in any sum. Derived
+here.
 """
 
 import math
@@ -99,7 +100,7 @@ INERTIAL_FIGURES: Mapping[str, InertialFigure] = {
 
 # ---------------------------------------------------------------------- correlated noise of a position
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
-    """Gauss–Markov process of an error that is correlated position noise, along the axes of `process_axes`."""
+    """Gauss–Markov process of an error that is correlated position noise; its axes are given by `process_axes`."""
     return _PROCESSES[error.kind.name](mission, error)[0]
 
 
@@ -161,7 +162,7 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
 def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> Floats:
     """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
 
-    `axes` are the vectors of the axes, with the same shape. `force` (3, ...) is the specific force. [m/s²] A tilt
+    `axes` (axes, 3, ...) are the unit vectors of the axes. `force` (3, ...) is the specific force. [m/s²] A tilt
     about an axis rotates the specific force. A scale factor error adds a fraction of the component of the specific
     force along the axis. Any other sensor error is an acceleration along the axis.
     """
@@ -412,12 +413,13 @@ def _with_arm(
 
 
 class _Walks(NamedTuple):
-    """Covariance of two integrals of the same white noise of density 1 over an aperture of 2 s.
+    """Covariance of two repeated integrals of the same white noise of density 1, over an aperture of 2 s.
 
-    Both integrals start at mid-aperture and run forward and backward in time. `at_nodes` (nodes, nodes) is the
-    covariance of the first integral with the second at the nodes, in the Legendre orders that the nodes can
-    distinguish. `left` is the mean, over the aperture, of the expected product of both integrals without their
-    Legendre orders 0 to 3. `beyond` is the same mean without all orders that the nodes can distinguish.
+    The noise is integrated once or several times, see `_walks`. Both integrals start at mid-aperture and run forward
+    and backward in time. `at_nodes` (nodes, nodes) is the covariance of the first integral with the second at the
+    nodes, in the Legendre orders that the nodes can distinguish. `left` is the expected product of the two integrals,
+    averaged over the aperture, after Legendre orders 0 to 3 are removed from both. `beyond` is the same average after
+    every order that the nodes can distinguish is removed.
     """
 
     at_nodes: Floats
@@ -438,7 +440,7 @@ def _walks(first: int, second: int, count: int) -> _Walks:
     def order_of(times: int) -> Floats:
         """Legendre coefficients of unit impulses that are integrated `times` + 1 times, (count, starts).
 
-        Each column belongs to the start time of an impulse.
+        Each column is for one start time of the impulse.
         """
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
@@ -488,9 +490,9 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield the noise of a platform's log if the processor uses its fixes without smoothing; otherwise no errors.
 
     A Gauss–Markov process represents the residual of the fixes about the smooth path. It has the covariance and the
-    correlation time of the residual. White fixes joined by straight lines are correlated over half an interval. Like
-    any noise, the process displaces and defocuses the image by its low orders, and spreads power by its higher
-    orders.
+    correlation time of the residual. Independent fixes that are joined by straight lines are correlated over half an
+    interval. Like any noise, the process displaces and defocuses the image by its low orders, and spreads power by
+    its higher orders.
 
     The fixes are rounded to a grid with the step q. The rounding error is uniformly distributed over a step and has
     the variance q²/12 along each coordinate. If the platform crosses many steps within the aperture, the rounding

@@ -80,7 +80,7 @@ def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
 def is_unshaken(mission: Mission, name: str) -> bool:
     """Whether an oscillator is sensitive to acceleration, but the file states no vibration or turn that acts on it.
 
-    With a direct path it is false for the transmitter's oscillator, whose phase drops out of the data.
+    With a direct path, the result is false for the transmitter's oscillator, whose phase drops out of the data.
     """
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
@@ -100,8 +100,8 @@ class AcceleratedTone(NamedTuple):
     `name` is the platform, and `entry` the index of the vibration in the file. `frequency` is in Hz, and
     `acceleration` is the amplitude of the acceleration. [m/s²] `free` is the peak phase without synchronization at
     the radar's centre frequency, per unit of the sensitivity Γ. [rad/(s²/m)] `sensitivity` is Γ. [s²/m] `left` are
-    the tones that remain of a tone of amplitude 1 after synchronization, and `echo` is the amplitude with which they
-    make echoes.
+    the tones that synchronization leaves of a tone of amplitude 1, and `echo` is the amplitude with which these
+    residual tones make echoes.
 
     `in_quadrature` is the id of the row of the platform's vibration that causes the tone. The tone is a quarter cycle
     out of phase with that vibration. `in_quadrature` is None for a vibration along several axes, and for a vibration
@@ -138,7 +138,8 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
     """List the tones that sinusoidal vibrations cause in the oscillators of the platforms.
 
     With a direct path as clock, only the receiver's tones are listed. They enter both the direct path and the echo.
-    `geometry` is the geometry of all cases, if numbers of the mission are arrays; omitted: the mission's own.
+    If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By default it is the
+    mission's own geometry.
     """
     tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -185,7 +186,7 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 
 
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
-    """Mean squares of the parts of the range error that vibration causes, per squared unit of Γ. [m²/unit²]
+    """Mean squares of the Legendre parts of the range error due to vibration, per squared unit of Γ. [m²/unit²]
 
     They are sums over the vibration spectrum and the slow tones, each tone in its worst phase.
     """

@@ -1,4 +1,4 @@
-"""Tones in the phase of oscillators: spurs, and the tones that remain of any tone after synchronization.
+"""Tones in the phase of oscillators: spurs, and the residual tones that synchronization leaves of a tone.
 
 The exchanges of pulses, at intervals T_s, sample a tone at frequency f. Between the samples, the phase is
 interpolated linearly. The interpolated phase contains tones at f + m/T_s. Their amplitudes are sinc²((f + m/T_s)·T_s)
@@ -26,7 +26,7 @@ _NEIGHBOUR_RATE_COUNT = (
 
 
 class LeftTone(NamedTuple):
-    """Tones that remain of a tone of amplitude 1 after synchronization.
+    """Residual tones that synchronization leaves of a tone of amplitude 1.
 
     `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
     are the amplitudes of the remaining tones; 0 for a frequency that does not occur.
@@ -87,7 +87,7 @@ class LeftTone(NamedTuple):
         return of_largest
 
     def slow_parts(self, aperture_time: PerCase) -> Parts:
-        """Squares of the parts, over the aperture, of the sum of all tones below one cycle per aperture. [rad²]
+        """Squared Legendre parts, over the aperture, of the sum of all tones below one cycle per aperture. [rad²]
 
         Each tone is taken in its worst phase. The remaining tones are not independent, so the amplitudes of their
         parts add.
@@ -106,7 +106,7 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """Tones that remain of a tone of amplitude 1 at a given frequency [Hz] after synchronization.
+    """Residual tones that synchronization leaves of a tone of amplitude 1 at a given frequency. [Hz]
 
     With a direct path, the receiver's tone remains with the amplitude 2|sin(πfΔt)|, where Δt is the delay of the echo
     after the direct path. Without a direct path or an exchange of pulses the tone remains unchanged.
@@ -131,7 +131,8 @@ class Spur(NamedTuple):
     """Spur of an oscillator: name of the platform, index of the spur in the file, and frequency [Hz].
 
     `free` is the peak phase at the radar's centre frequency without synchronization. [rad] `left` are the tones that
-    remain of a tone of amplitude 1 after synchronization. `echo` is the amplitude with which they make echoes.
+    synchronization leaves of a tone of amplitude 1. `echo` is the amplitude with which these residual tones make
+    echoes.
     """
 
     name: str
@@ -152,7 +153,7 @@ class Spur(NamedTuple):
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: PerCase) -> Parts | None:
-        """Squares of the parts, over the aperture, of the spur's tones below one cycle per aperture. [rad²]
+        """Squared Legendre parts, over the aperture, of the spur's tones below one cycle per aperture. [rad²]
 
         None if the synchronization does not fold the spur.
         """
@@ -165,7 +166,8 @@ def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list
     """List the spurs of oscillators that reach the image.
 
     With a direct path as clock, only the receiver's spurs are listed. They enter both the direct path and the echo.
-    `geometry` is the geometry of all cases, if numbers of the mission are arrays; omitted: the mission's own.
+    If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By default it is the
+    mission's own geometry.
     """
     spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:

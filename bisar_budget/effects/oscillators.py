@@ -122,7 +122,7 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variance that each power-law coefficient h₋₂, h₋₁, h₀, h₁ and h₂ causes if its value is 1, (5,).
+    """Allan variances due to the power-law coefficients h₋₂, h₋₁, h₀, h₁ and h₂, each with the value 1, (5,).
 
     `tau` is the averaging time. [s] `bandwidth` is the bandwidth of the measurement. [Hz]
     """
@@ -146,9 +146,9 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     """Fit a power law with non-negative coefficients h₋₂ … h₁ to an Allan deviation.
 
     `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz, and `aperture_time` in s. The
-    fit minimises the squares of the relative errors of the Allan variances. It uses as few terms as describe the
-    points. Several sets of terms may describe the points almost equally well. The fit then uses the set with the
-    largest quadratic phase over the aperture.
+    fit minimises the squares of the relative errors of the Allan variances. It uses the smallest number of terms that
+    describe the points. Several sets of terms may describe the points almost equally well. The fit then uses the set
+    with the largest quadratic phase over the aperture.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
@@ -276,8 +276,9 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerC
 def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
     """Mark the cases in which the spectrum used for an oscillator may differ from its actual spectrum, (cases,).
 
-    A case is marked if the power law fits the Allan deviation poorly. All cases are marked if the file replaces the
-    mask of a part by a mask without a frequency, which is then taken at the frequency of the part.
+    A case is marked if the power law fits the Allan deviation poorly. All cases are marked if the file overrides the
+    mask of a part with a mask for which it states no frequency. Such a mask is assumed to apply at the frequency of
+    the part.
     """
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
@@ -301,11 +302,12 @@ def states_both_terms(mission: Mission) -> bool:
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects of a clock's phase error in the published and in the full model.
 
-    `noise` and `tones` are the mean squares of the parts of its noise and of its slow tones over the aperture. [rad²]
-    Orders 0 and 1 of the noise are included if they are finite. If they are not, the displacement is unknown and is
-    NaN. It is 0 if orders 2 and 3 are 0 as well. If the file states the constant and the linear term of the clock,
-    these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the slow tones are then still included. If the
-    line of sight turns, orders 2 and 3 also displace the image, which reduces the defocus that they cause.
+    `noise` and `tones` are the mean squares of the Legendre parts of its noise and of its slow tones over the
+    aperture. [rad²] Orders 0 and 1 of the noise are included if they are finite. If they are not, the displacement is
+    unknown and is NaN. It is 0 if orders 2 and 3 are 0 as well. If the file states the constant and the linear term
+    of the clock, these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the slow tones are then still
+    included. If the line of sight turns, orders 2 and 3 also displace the image, which reduces the defocus that they
+    cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -329,7 +331,8 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
     """Mean squares of the parts of the oscillator phase that remains after synchronization, (parts, cases). [rad²]
 
     They hold for a centre frequency of 1 Hz. For a centre frequency of f₀ Hz they are f₀² times as large. The parts
-    are the fields of `Parts`. With `is_below_mask`, only the spectrum below the first point of the mask is included.
+    are the Legendre parts in the fields of `Parts`. With `is_below_mask`, only the spectrum below the first point of
+    the mask is included.
 
     The remaining phase depends on how the clocks are synchronized. For free clocks, all of the noise remains. If the
     clocks exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the

@@ -138,9 +138,9 @@ class RandomError(NamedTuple):
     `declared` is the declared size, coverage factor included; None if the file declares no size. For an error along
     several axes it is the largest size of all axes, and the sizes of all axes are proportional to it. The unit of an
     oscillator's error is `dB`, and its noise is declared as an amplitude factor of 1. `noise` is the spectrum of an
-    oscillator; it is None for many cases and for other errors. `noise_in_case` computes the spectrum from the mission
-    of one case and the name of the platform. `spreads` is true for noise, and false for an error whose variation over
-    the aperture has only a few orders.
+    oscillator; it is None if the numbers are arrays over cases, and for errors of any other kind. `noise_in_case`
+    computes the spectrum from the mission of one case and the name of the platform. `spreads` is true for noise, and
+    false for an error whose variation over the aperture has only a few orders.
 
     `counted_in` is the id of another row that already includes the effect of this error. This error is then left out
     of sums. `moves` is the motion of platforms due to one unit, used for the edge of a scene. It is empty for clocks
@@ -240,8 +240,8 @@ class SensorCases:
     def axes(self, name: str, frame: str = "") -> Floats:
         """Axes of a frame at the platform `name`, as unit vectors in scene coordinates, (axes, 3, cases).
 
-        `frame` is the name of the frame. If it is empty, the frame is that of the platform's motion error in the
-        file.
+        `frame` is the name of the frame. If it is empty, the frame of the platform's motion error in the file is
+        used.
         """
         path: PlatformState = getattr(self.geometry, name)
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
@@ -406,7 +406,7 @@ class SensorCases:
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """Effects, in both models, of noise with given mean squares of its parts over the aperture.
+        """Effects, in both models, of noise with given mean squares of its Legendre parts over the aperture.
 
         `noise` are the mean squares. [m²] `along` (nodes, cases) is the range error in the data per metre of the
         noise. Orders 0 to 3 displace and defocus the image, and the part beyond them spreads power. The result is

@@ -58,8 +58,7 @@ def effect_weights(exact: ExactRanges) -> Floats:
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
     """Effects of independent range errors, each a known variation over the aperture times a random size.
 
-    `weights` are the weights of `effect_weights`. `courses` (errors, nodes, cases) are the range errors at 1 sigma.
-    [m]
+    `weights` is the result of `effect_weights`. `courses` (errors, nodes, cases) are the range errors at 1 sigma. [m]
     """
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
@@ -132,7 +131,7 @@ def effects_of_gauss_markov(
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
-    """Departure exp(−|t|/τ_c) − 1 between each two nodes, in the Legendre orders that the nodes can distinguish.
+    """Departure exp(−|t|/τ_c) − 1 for each pair of nodes, in the Legendre orders that the nodes can distinguish.
 
     The departure has a kink at lag 0, which its values at the nodes would not resolve. Therefore it is first
     integrated against Legendre polynomials. Higher orders are not needed, because the smooth weights do not contain

@@ -100,7 +100,7 @@ class SlowTone(NamedTuple):
 
     `per_metre` is the effect of a sinusoidal range error with an amplitude of 1 m. `declared` is the effect of the
     declared vibration. `is_there` (cases,) marks the cases in which the vibration has fewer than three cycles per
-    aperture. `hears_part` tells that only a part of the motion is range error. It is true for a vibration that the
+    aperture. `hears_part` is true if only a part of the motion is range error, which is so for a vibration that the
     file states along three axes, and for any vibration in a mission with a direct path.
     """
 
@@ -231,10 +231,10 @@ def _of_case(component: PerCase, case: Indices) -> PerCase:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Sum over the axes of the largest effect of each axis for any value of the phase ψ, (cases,).
+    """Largest effect of each axis over all values of the phase ψ, summed over the axes, (cases,).
 
-    `squares` (axes, TONE_PHASE_COUNT, cases) are the squares of the effects. They are interpolated between the values
-    of ψ.
+    `squares` (axes, TONE_PHASE_COUNT, cases) are the squares of the effects, and are interpolated between the values
+    of ψ. The sum is of the effects, not of their squares.
     """
     steps = TONE_PHASE_COUNT * VALUES_PER_PHASE
     around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * VALUES_PER_PHASE

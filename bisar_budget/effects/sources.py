@@ -138,7 +138,7 @@ class ErrorListing:
         ]
 
     def published_legs(self, platform_index: int, kind: StateKind) -> list[Effect]:
-        """Effects of a unit error of one platform along each of x, y and z by the published model, Tables I and II.
+        """Effects of a unit error of one platform along each of x, y and z in the published model (Tables I and II).
 
         `kind` is the kind of the error: position, velocity or acceleration.
         """
@@ -176,9 +176,9 @@ class ErrorListing:
     def _flown(self, kind: StateKind, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
         """Effects of motion errors, and the motions they cause, where at least one platform is in free fall.
 
-        In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are relative to
-        the stars. In this frame, the vector of a position error without a velocity error therefore does not rotate
-        relative to the stars. In all other frames it rotates with the Earth.
+        In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are inertial. A
+        position error in this frame, without a velocity error, is therefore a vector that keeps its direction in
+        inertial space. In all other frames the vector rotates with the Earth.
 
         Parameters
         ----------
@@ -493,7 +493,7 @@ class ErrorListing:
     def _of_time_tags(self) -> Iterator[ErrorSource]:
         """Yield the errors of navigation time relative to radar time, for each platform and for both in common.
 
-        With a time-tag error δt, the position is measured a time δt too late. The position error is then p(τ + δt) −
+        With a time-tag error δt, the position is measured too late by δt. The position error is then p(τ + δt) −
         p(τ), with the path p. For a small δt it is v(τ)·δt, with the velocity v. For a larger δt, exact ranges use
         the path itself.
         """
@@ -606,7 +606,7 @@ class ErrorListing:
     def _of_terrain(self) -> Iterator[ErrorSource]:
         """Yield the error of a scene that is higher than the processor assumes, if the file states such an error.
 
-        Its effect is that of measuring both platforms too high by the same amount.
+        Its effect is the same as if both platforms were measured too high by the same amount.
         """
         height = self.mission.scene.height_error
         if height is None:
@@ -647,9 +647,9 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Texts for the rows of a platform's errors of one kind along the axes x, y and z of the scene.
+    """Subject, key path, equation and no-limit note of the rows for errors along the axes x, y and z of the scene.
 
-    Each item has the row's subject, its key path in the file, its equation, and the reason why it may have no limit.
+    The errors are errors of one platform and one kind. The note gives the reason why the row may have no limit.
     """
     return tuple(
         (
@@ -665,7 +665,7 @@ def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str
 def _along_scene_axis(
     declared: Sequence[PerCase], axes: tuple[Vectors, Vectors, Vectors], axis: int, distribution: str
 ) -> PerCase:
-    """Size, along one axis of the scene, of three errors that are stated along the axes of another frame.
+    """Combined size, along one axis of the scene, of three errors that are stated along the axes of another frame.
 
     `declared` are the three errors. `axes` are unit vectors of the frame in scene coordinates, and `axis` is the
     index of the scene axis. The three errors are independent: the squares of one-sigma values add, and the magnitudes

@@ -1,7 +1,8 @@
-"""Parts of phase noise over an aperture: spectra of power-law pieces, weighted with the Legendre parts of a tone.
+"""Legendre parts of phase noise over an aperture, computed from spectra that consist of power-law pieces.
 
-The parts are a constant, linear, quadratic and cubic part, and the phase beyond the cubic. Spectra are one-sided, for
-phase at the radar's centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a spectrum.
+The parts are a constant, linear, quadratic and cubic part, and the phase beyond the cubic. Their mean squares are
+integrals of the spectrum, weighted with the squared parts of a tone. Spectra are one-sided, for phase at the radar's
+centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a spectrum.
 
 The integrals use the angle x = πfT in place of the frequency f. The edges of the integration panels are then the same
 for every aperture time T, and so is the integral of a power law between two edges. Only the ends of a piece are
@@ -87,9 +88,9 @@ class Parts(NamedTuple):
 
 
 def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
-    """Mean squares of the parts of a stationary Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
+    """Mean squares of the Legendre parts of a Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
 
-    `aperture_time` and `correlation_time` τ_c are in s.
+    The process is stationary. `aperture_time` and `correlation_time` τ_c are in s.
     """
     ratio = np.asarray(aperture_time / (2 * correlation_time))
     (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
@@ -99,7 +100,7 @@ def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
 
 
 def tone(angle: PerCase) -> Floats:
-    """Largest parts of a tone of amplitude 1 over the aperture, each at the worst phase of the tone, (5, ...).
+    """Largest Legendre parts of a tone of amplitude 1 over the aperture, each at the tone's worst phase, (5, ...).
 
     `angle` is πfT. [rad] The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
     constant part, and linear part. The four parts are amplitudes at the aperture edge.
@@ -144,7 +145,7 @@ _MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
-    """Edges of the frequency panels for integrals over the parts of a tone, in rising order. [Hz]
+    """Edges of the frequency panels for integrals over the parts of a tone, in ascending order. [Hz]
 
     `aperture_time` is in s. Within a panel the parts of a tone are smooth functions of frequency.
     """
@@ -189,9 +190,9 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
-    """Integrate a spectrum, weighted with the squared parts of a tone, to the mean squares of the parts of the phase.
+    """Mean squares and products of the Legendre parts of a phase over the aperture, from its spectrum.
 
-    The result is accurate to 1e-4.
+    They are integrals of the spectrum, weighted with the squared parts of a tone. The result is accurate to 1e-4.
 
     Parameters
     ----------
@@ -212,7 +213,7 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Mean squares of the parts of the phase that remains after synchronization, (cases,) each.
+    """Mean squares of the Legendre parts of the phase that remains after synchronization, (cases,) each.
 
     `pieces` are the pieces of the phase spectrum before synchronization. `aperture_time` is (cases,). [s] `interval`
     is the interval of the exchanged pulses [s]; None if pulses are not exchanged, so that all of the phase remains.
@@ -228,7 +229,10 @@ def _like(total: Floats, aperture_time: PerCase) -> Parts:
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts due to a spectrum x^(−slope) between the angles `low` and `high`, (parts, cases)."""
+    """Legendre parts of a phase with the spectrum x^(−slope) between the angles `low` and `high`, (parts, cases).
+
+    The angles are x = πfT. [rad] The first axis (parts) has the integrals listed in `squares`.
+    """
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
     has_edge = last > first
@@ -241,15 +245,19 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Parts due to a spectrum x^(−slope) from the first panel edge to each edge, (parts, edges)."""
+    """Legendre parts of a phase with the spectrum x^(−slope) from the first panel edge to each edge, (parts, edges).
+
+    The first axis (parts) has the integrals listed in `squares`.
+    """
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
     return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts due to a spectrum x^(−slope) between the angles `low` and `high` within one panel, (parts, cases).
+    """Legendre parts of a phase with the spectrum x^(−slope) between two angles within one panel, (parts, cases).
 
-    Slow tones and fast tones have their own formulas. The result is 0 for a panel of zero width.
+    `low` and `high` (cases,) are the angles x = πfT. [rad] The first axis (parts) has the integrals listed in
+    `squares`. Slow tones and fast tones have their own formulas. The result is 0 for a panel of zero width.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -273,28 +281,30 @@ def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts due to a spectrum x^(−slope) between two angles of slow tones, (parts, cases).
+    """Legendre parts of a phase with the spectrum x^(−slope) between two angles of slow tones, (parts, cases).
 
-    The quadratic and cubic part, the power beyond the cubic, the constant and the linear part of a tone are replaced
-    by their leading powers x²/2, x³/6, x⁸/99225, 1 and x.
+    The first axis (parts) has the integrals listed in `squares`. The quadratic and cubic part, the power beyond the
+    cubic, the constant and the linear part of a tone are replaced by their leading powers x²/2, x³/6, x⁸/99225, 1 and
+    x.
     """
     powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts due to a spectrum x^(−slope) between two angles of fast tones, (parts, cases).
+    """Legendre parts of a phase with the spectrum x^(−slope) between two angles of fast tones, (parts, cases).
 
-    Terms that oscillate with the angle x are averaged.
+    The first axis (parts) has the integrals listed in `squares`. Terms that oscillate with the angle x are averaged.
     """
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
-    """Parts due to a spectrum x^(−slope) over n panels, by Gauss–Legendre quadrature, (parts, n).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, over n panels, (parts, n).
 
-    `low` and `high` (n,) are the ends of the panels, as angles.
+    The first axis (parts) has the integrals listed in `squares`. They are computed by Gauss–Legendre quadrature.
+    `low` and `high` (n,) are the ends of the panels, as angles x = πfT. [rad]
     """
     span = np.log(high / low)
     x = low * np.exp(span * _LEGENDRE_NODES)
@@ -303,12 +313,13 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def squares(angle: Floats) -> Floats:
-    """Squares of a tone's parts, its power beyond the cubic, and two products of parts, in the order of `Parts`.
+    """Squares and products of the Legendre parts of a tone over the aperture, (7, …).
 
-    `angle` is πfT. [rad] The products are constant times quadratic part, and linear times cubic part. All values are
-    mean values for a tone of power 1 and random phase. They are also the values for a tone of amplitude 1 if each
-    part has its worst phase. The part of order n is shifted in phase by n quarter cycles, so parts whose orders
-    differ by two have opposite signs.
+    The rows are the squares of the quadratic and cubic part, the power beyond the cubic, the squares of the constant
+    and linear part, the product of the constant and quadratic part, and the product of the linear and cubic part.
+    `angle` is πfT. [rad] All values are mean values for a tone of power 1 and random phase. They are also the values
+    for a tone of amplitude 1 if each part has its worst phase. The part of order n is shifted in phase by n quarter
+    cycles, so parts whose orders differ by two have opposite signs.
     """
     quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -325,13 +336,14 @@ _GRID_AGES_CYCLES = np.concatenate(
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
-    """Integrate a spectrum to the parts of the phase of a clock that was set before the aperture, (cases,) each.
+    """Mean squares and products of the Legendre parts of the phase of a clock that was set before the aperture.
 
-    Setting the clock subtracts a line that is fitted to the clock's phase over the averaging time, at an age H before
-    mid-aperture. With x = πfT, y = πft_c and θ = 2πfH, a tone then has order 0, A₀ = j₀(x) − e^(−iθ)·[j₀(y) +
-    H·(6i/t_c)·j₁(y)], and order 1, A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y), at the aperture edge. The higher
-    orders are the same as for a free clock. Derived here. The result is bounded for spectra up to a slope of f⁻⁴.
-    Above 24 cycles within the age, the phases during setting and aperture are treated as uncorrelated.
+    The parts are computed from the spectrum of the phase, (cases,) each. Setting the clock subtracts a line that is
+    fitted to the clock's phase over the averaging time, at an age H before mid-aperture. With x = πfT, y = πft_c and
+    θ = 2πfH, the constant part of a tone is then A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)], and its linear part
+    at the aperture edge is A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y). The higher orders are equal to the orders
+    for a clock that was never set. Derived here. The result is bounded for spectra up to a slope of f⁻⁴. Above 24
+    cycles within the age, the phases during setting and aperture are treated as uncorrelated.
 
     Parameters
     ----------
@@ -376,7 +388,7 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
 
 
 def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
-    """Yield the mean squares and mean products of the orders of a tone of power 1, for a clock that was set.
+    """Yield the mean squares and products of the Legendre orders of a tone of power 1, for a clock that was set.
 
     The line that was fitted to set the clock is subtracted. The values are Re(A_m·A_n*), in the shape of `f` [Hz],
     for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13. The amplitudes A₀ and A₁ are given in `set_parts`.
@@ -399,16 +411,16 @@ _FOLLOWED_DELAY_CYCLES = 12  # cycles of a tone within the delay up to which pan
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
-    """Integrate the spectrum of the difference of a clock's phase between two times, S·4 sin²(πfΔt), to its parts.
+    """Mean squares and products of the Legendre parts of the change of a clock's phase over a delay.
 
-    S is the spectrum of the phase itself.
+    They are integrals of the spectrum S·4 sin²(πfΔt) of the change, where S is the spectrum of the phase itself.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Pieces of the one-sided spectrum S. [rad²/Hz]
     aperture_time, delay : float or (cases,)
-        Aperture time T, and time Δt between the two times. [s]
+        Aperture time T, and delay Δt. [s]
     """
     times, delays = np.broadcast_arrays(np.atleast_1d(aperture_time), np.atleast_1d(delay))
     end = max((piece.high for piece in pieces), default=0.0)
@@ -429,14 +441,14 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
-    """Integrate the phase spectrum that remains after synchronization by exchanged pulses to the parts of the phase.
+    """Mean squares and products of the Legendre parts of the phase that remains after an exchange of pulses.
 
-    The phase is sampled at an `interval` T_s. [s] The remaining phase is the phase less the straight lines that join
-    its samples. The lines contain sinc²(f·T_s) of a tone's amplitude at its own frequency f, and fold onto f every
-    tone at a distance of m/T_s. A spectrum S becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may
-    begin at any instant within the interval. Pieces may be narrow or steep, and may begin and end anywhere. The
-    result is accurate to 1e-4. An exception are tones of more than 24 cycles within the aperture, whose parts are
-    averaged over their cycles.
+    They are integrals of the spectrum of the remaining phase. The exchanged pulses sample the phase at an `interval`
+    T_s. [s] The remaining phase is the phase minus the straight lines that join its samples. For a tone at the
+    frequency f, these lines contain sinc²(f·T_s) of its amplitude. They also fold every tone at f + m/T_s onto f. A
+    spectrum S therefore becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may begin at any instant
+    within the interval. Pieces may be narrow or steep, and may begin and end anywhere. The result is accurate to
+    1e-4, except for tones of more than 24 cycles within the aperture, whose parts are averaged over their cycles.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -452,10 +464,10 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Mean squares of the parts of a phase made of independent samples of variance 1 joined by straight lines.
+    """Mean squares of the Legendre parts of a phase that joins independent samples of variance 1 by straight lines.
 
-    The samples have the `interval` T_s. [s] The one-sided spectrum of the phase is 2·T_s·sinc⁴(f·T_s). Its total
-    power is ⅔.
+    `interval` is the time T_s between the samples. [s] The one-sided spectrum of the phase is 2·T_s·sinc⁴(f·T_s). Its
+    total power is ⅔.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
@@ -472,7 +484,7 @@ def _over_panels(
     high: Floats,
     scale: Floats,
 ) -> Floats:
-    """Integrate a spectrum, weighted with the squared parts of a tone, over panels from 0 Hz on, (parts, cases).
+    """Integrals of a spectrum, weighted with the squared parts of a tone, over panels from 0 Hz up, (parts, cases).
 
     `density` is the spectrum, a function of frequencies and of the indices of their cases. `edges` are the edges of
     the panels of each case, and `high` (cases,) is the end of the last panel. [Hz] `scale` (cases,) is πT. [s]
@@ -494,9 +506,10 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add to `total` the parts due to a spectrum above the frequencies `last` [Hz], multiplied by `times`.
+    """Add to `total` the Legendre parts due to a spectrum above the frequencies `last` [Hz], multiplied by `times`.
 
-    `total` is (parts, cases). `scale` is πT. [s] Terms that oscillate with the angle πfT are averaged.
+    `total` (parts, cases) has the integrals listed in `squares`. `scale` is πT. [s] Terms that oscillate with the
+    angle πfT are averaged.
     """
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
@@ -506,8 +519,9 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
-    """Parts due to a spectrum over n frequency panels, by Gauss–Legendre quadrature, (parts, n).
+    """Integrals of a spectrum, weighted with the squared parts of a tone, over n frequency panels, (parts, n).
 
+    The first axis (parts) has the integrals listed in `squares`. They are computed by Gauss–Legendre quadrature.
     `density` is the spectrum as a function of frequency. `low` and `high` (n,) are the ends of the panels. [Hz]
     `scale` (n,) is πT. [s]
     """
@@ -545,8 +559,8 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
     """Sum of the densities of a piece at the frequencies m·rate ± start, for m = 1, 2 … [rad²/Hz]
 
-    `start` is at most half the sampling rate. [Hz] Near aliases, where the power law changes much within one sampling
-    rate, are added one by one. The Euler–Maclaurin formula gives the sum of all other aliases.
+    `start` is at most half the sampling rate. [Hz] Aliases near 0 Hz, where the power law changes strongly within one
+    sampling rate, are added one by one. The Euler–Maclaurin formula gives the sum of the remaining aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
@@ -565,9 +579,9 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
     """Mean spectrum of the images that are not computed one by one, as pieces of a power law f⁻⁴.
 
     An image is the part of a spectrum that synchronization folds to another frequency. The mean is (2/T_s³)·∫
-    S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency have a distance of x sampling rates from the multiples of the
-    rate. According to the Euler–Maclaurin formula, the mean lacks the term B₂(x) times the slope at its lower end.
-    Pieces that begin half a rate lower and half a rate higher replace that term.
+    S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency lie x sampling rates away from the multiples of the rate.
+    According to the Euler–Maclaurin formula, a term has to be added to the mean: B₂(x) times the slope at the lower
+    end. Two pieces approximate this term; they begin half a sampling rate below and above the lower end.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _LEGENDRE_NODES
@@ -602,10 +616,11 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
-    """Edges of the frequency panels for a phase that is synchronized or compared with itself after an interval. [Hz]
+    """Edges of the frequency panels for a synchronized phase, or for the change of a phase over an interval. [Hz]
 
     `aperture_time` is in s. `rate` is the inverse of the interval. [Hz] Within a panel, the parts of a tone are
-    smooth functions of frequency. So is the fraction of the tone that the straight lines between samples contain.
+    smooth functions of frequency. The same holds for the fraction of the tone that the straight lines between samples
+    contain.
     """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
@@ -631,7 +646,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Yield the ends of a piece, and the frequencies to which a steep piece falls by certain powers of e. [Hz]"""
+    """Yield the ends of a piece, and the frequencies at which a steep piece has fallen by powers of e⁶. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high

@@ -1,7 +1,7 @@
 """Declared vibrations: paired echoes, components along the line of sight, slow phases, and spectra.
 
-If the receiver uses the direct path as its clock, the data contain ranges less the direct path. The effect of a
-vibration is then its effect on this difference.
+If the receiver uses the direct path as its clock, the data contain ranges minus the length of the direct path. The
+effect of a vibration is then its effect on this difference.
 
 A vibration of peak phase φ and n < 1 cycles per aperture makes no echoes. Its largest Legendre parts of order 2 and 3
 over the aperture are 5·j₂(πn)·φ and 7·j₃(πn)·φ. The phases at the aperture edge are 3/2 and 5/2 of these parts. Their
@@ -73,7 +73,7 @@ class Worst(NamedTuple):
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Number of the group to which each tone belongs, where neighbours are at most 2.5 cycles per aperture apart.
+    """Number of the group of each tone; neighbouring tones of a group are at most 2.5 cycles per aperture apart.
 
     `cycles` are the cycles per aperture of the tones, (n, cases). The result has the same shape. A group has two or
     more tones. The groups of a case are numbered from 0 in order of frequency. A tone outside all groups, or below
@@ -219,8 +219,8 @@ class Line(NamedTuple):
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
     """Reduction of the range per metre of a platform's motion along each scene axis, at mid-aperture. [m/m]
 
-    With a direct path it is the reduction of the range less the direct path. `geometry` is the mission's own if
-    omitted.
+    With a direct path, it is the reduction of the range minus the direct path. By default, `geometry` is the
+    mission's own geometry.
     """
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     return sights[PLATFORMS.index(name)]
@@ -233,8 +233,9 @@ def seen_of_axes(
 
     The line of sight turns over the aperture. The rms is an upper bound for the height of every echo, and gives the
     spread. If `is_vector` is true, the axes are those of the frame of the platform's motion error. If it is false,
-    the file states a single value along the line of sight, and the result has a single item. All of such a vibration
-    is range error, but with a direct path only a part of it is an error of the range less the direct path.
+    the file states a single value along the line of sight, and the result has a single item. Such a vibration is
+    entirely range error; with a direct path, however, only a part of it is an error of the range minus the direct
+    path.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
@@ -303,8 +304,8 @@ def projected(
     """Note on the component of a vibration along the line of sight; empty if the vibration is stated along it.
 
     `value` is the stated amplitude or rms, and `along` is the component. [m] With a direct path there is a note for
-    every vibration, which gives the component in the range less the direct path. For a slow vibration (`is_slow`) the
-    note gives the amplitude along the line of sight that would have the same effect.
+    every vibration, which gives the component in the range minus the direct path. For a slow vibration (`is_slow`)
+    the note gives the amplitude along the line of sight that would have the same effect.
     """
     says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
@@ -429,7 +430,7 @@ def spectrum_parts(
     interval: float | None = None,
     delay: PerCase | None = None,
 ) -> Parts:
-    """Mean squares of the parts over the aperture of a motion or phase due to a vibration spectrum, (cases,) each.
+    """Mean squares of the Legendre parts of a motion or phase due to a vibration spectrum, (cases,) each.
 
     The power law `law` converts the vibration spectrum to the spectrum of the motion or phase, see `spectrum_pieces`.
     With an `interval` of exchanged pulses [s], the parts describe the phase that remains after synchronization. With

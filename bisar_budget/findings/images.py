@@ -80,10 +80,10 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Text ` of equal loss` to append to the name of the judged phase, or an empty text.
+        """Suffix ` of equal loss` for the name of the judged phase, or an empty string.
 
-        It is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits the
-        cubic phase.
+        The result is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits
+        the cubic phase.
         """
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase

@@ -85,7 +85,7 @@ class MissionFindings(NamedTuple):
         return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
 
     def texts_of(self, judged: JudgedRequirement | Row) -> list[str]:
-        """Texts of the requirement ids of a row or requirement; ids without a text are left out."""
+        """Requirement texts for the ids of a row or requirement; ids without a text are left out."""
         return [
             self.requirement_texts[own_id] for own_id in judged.requirement_ids if own_id in self.requirement_texts
         ]

@@ -25,9 +25,10 @@ class DecidingShare:
     """A share of a requirement whose limit decides the status, in place of the limit of the full requirement.
 
     `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. `owner` is the platform
-    or the clock to which the share belongs. Three other values stand for limits that are no shares: `autofocus` for
-    the pull-in range of autofocus, which limits the sum of all phases; `scene` for the difference between the phases
-    at the edge and at the centre of the scene; and `band` for the phase of dispersion over the radar band.
+    or the clock to which the share belongs. `owner` has three further values, for limits that are not shares:
+    `autofocus` for the pull-in range of autofocus, which limits the sum of all phases; `scene` for the difference
+    between the phases at the edge and at the centre of the scene; and `band` for the phase of dispersion over the
+    radar band.
     """
 
     owner: str
@@ -39,15 +40,16 @@ class DecidingShare:
 class JudgedRequirement(NamedTuple):
     """A requirement of the mission, with its verdict.
 
-    Numbers are in SI, radians and decibel; None if a value does not exist. `value` and `allowed` are the requirement
-    as the file states it, or its default. `reached` is the total of the mission; with `combine: each` it is the value
-    of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of the share in
-    `share` if this share decides the status. `autofocus_gain` is the factor by which quadratic phases may exceed the
-    requirement and the shares of the platforms with autofocus; None for requirements on other quantities. `row` is
-    the row that decides the status, `use_row` is the row with the utilization, and `rows` are all rows that judge the
-    requirement. `reason` tells why the requirement cannot be judged, or why it is not met. `waivers` are the waivers
-    that cover the requirement or its rows; empty unless the requirement is waived. `is_unjudged` tells whether it
-    cannot be judged, even if it is waived. `requirement_ids` are the ids that the project gives to the requirement.
+    Numbers are in SI units, radians and decibels; None if a value does not exist. `value` and `allowed` are the
+    requirement as the file states it, or its default. `reached` is the total of the mission; with `combine: each` it
+    is the value of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of the
+    share in `share` if this share decides the status. `autofocus_gain` is the factor by which quadratic phases may
+    exceed the requirement and the shares of the platforms with autofocus; None for requirements on other quantities.
+    `row` is the row that decides the status, `use_row` is the row with the utilization, and `rows` are all rows that
+    judge the requirement. `reason` tells why the requirement cannot be judged, or why it is not met. `waivers` are
+    the waivers that cover the requirement or its rows; empty unless the requirement is waived. `is_unjudged` tells
+    whether it cannot be judged, even if it is waived. `requirement_ids` are the ids that the project gives to the
+    requirement.
     """
 
     key: str
@@ -97,7 +99,7 @@ class JudgedRequirement(NamedTuple):
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """A level [dB] by which the mission file shifts the figures of one kind of error from those of their source."""
+    """A level [dB] by which the mission file shifts the figures of one kind of error, relative to their source."""
 
     kind: str
     key: str
@@ -111,10 +113,7 @@ class ShiftedFigure:
 
     @property
     def off(self) -> str:
-        """Phrase that says from which source the level shifts the figures.
-
-        An example is `off the data sheet`.
-        """
+        """Phrase that names the source from which the level shifts the figures, such as `off the data sheet`."""
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
@@ -124,8 +123,8 @@ class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
 
     `declared` and `missing` together are all kinds. `without_source` are the declared kinds for which the file states
-    no source. `shifted` are the figures that a level shifts, relative to their source. `required` are the words of
-    `requirements.declare`.
+    no source. `shifted` are the figures that a level shifts, relative to their source. `required` are the names that
+    the file lists in `requirements.declare`.
     """
 
     declared: tuple[str, ...] = ()

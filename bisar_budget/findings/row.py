@@ -52,17 +52,18 @@ def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaive
 class Row(NamedTuple):
     """One row of the budget.
 
-    Numbers are in SI and radians; None if a value does not exist. `is_independent` marks rows of errors as the file
-    states them; only these rows are included in sums. Each of the other rows shows an error along an axis of the
-    scene, although the file states this error in another frame. `qpe_exact_rad` is equal to `qpe_full_rad`, which
-    comes from exact ranges. `published_margin_db` is the margin of the published rule for a vibration relative to
-    first principles. `binding_requirement` is the requirement that sets `allowable`. `cubic_rad` is the magnitude of
-    the declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that a declared random error adds.
-    `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as `qpe_full_rad` and the hidden phase
-    together; the hidden phase is the part that the bandwidth and the turn of the line of sight do not resolve.
-    `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the model that gives these numbers.
-    `waivers` are the waivers, valid or expired, that name the row while it fails. `refuted` names the images that
-    refute the limit of the row. `requirement_ids` are the ids that the project gives to the row.
+    Numbers are in SI units and radians; None if a value does not exist. `is_independent` marks the row of an error
+    along an axis in which the file states it; only such rows are included in sums. Any other row of an error shows it
+    along an axis of the scene, although the file states it in another frame. `qpe_exact_rad` is equal to
+    `qpe_full_rad`, which comes from exact ranges. `published_margin_db` is the margin of the published rule for a
+    vibration relative to first principles. `binding_requirement` is the requirement that sets `allowable`.
+    `cubic_rad` is the magnitude of the declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that
+    a declared random error adds. `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as
+    `qpe_full_rad` and the hidden phase together; the hidden phase is the part that the bandwidth and the turn of the
+    line of sight do not resolve. `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the
+    model that gives these numbers. `waivers` are the waivers, valid or expired, that name the row while it fails.
+    `refuted` names the images that refute the limit of the row. `requirement_ids` are the ids that the project gives
+    to the row.
     """
 
     subject: Subject

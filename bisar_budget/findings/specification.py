@@ -1,4 +1,4 @@
-"""The sheet of specifications: ordered sizes of errors that together meet every requirement, and their shares."""
+"""Sheet of specifications: specified sizes of errors that together meet every requirement, and their shares."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,13 +12,14 @@ if TYPE_CHECKING:
 
 
 class Specification(NamedTuple):
-    """Specification of one error: its largest size, and the value to order.
+    """Specification of one error: its largest permitted size, computed and rounded for a purchase order.
 
-    `value` is the computed size, `ordered` is this size rounded down, and `text` is the ordered value as written in a
-    mission file. They are None and empty if no requirement limits the error. `found_text` is the text of `value` in
-    the same unit. `remark` explains the number to a supplier. `declared` is the declared size in the file, the
-    largest of three axes. `shares` has the share of the error in each requirement, in the row where it is largest.
-    `parts` are the parts of the catalogue that meet the ordered value.
+    `value` is the computed size, `ordered` is this size rounded down, which is the specified value, and `text` is the
+    specified value as written in a mission file. If no requirement limits the error, `value` and `ordered` are None
+    and `text` is empty. `found_text` is the text of `value` in the same unit. `remark` explains the number to a
+    supplier. `declared` is the declared size in the file, the largest of three axes. `shares` has the share of the
+    error in each requirement, in the row where it is largest. `parts` are the parts of the catalogue that meet the
+    specified value.
     """
 
     key: str
@@ -37,8 +38,8 @@ class Specification(NamedTuple):
     def holds(self, value: float | None) -> bool:
         """Whether a size meets the specification.
 
-        The result is True if no value is ordered, whatever the size is. If a value is ordered, the result is False
-        for a size of None.
+        Without a specified value, the result is True for any size. With a specified value, it is False if the size is
+        None.
         """
         if self.ordered is None:
             return True
@@ -54,8 +55,8 @@ class RowUse(NamedTuple):
     `requirement` is the requirement that judges the row; None if no requirement covers the effect, which must then
     stay negligible. `used` is the utilization of the row, and `allowed` is its limit. `fixed` is the share of the
     limit that all errors without a specification use, and `shares` are the shares of the specified errors.
-    `multiplier` tells how strongly the row limits the sizes: the weight of each error is the sum of multiplier·share
-    of all rows.
+    `multiplier` states how strongly the row limits the sizes: the weight of each error is the sum of multiplier·share
+    over all rows.
     """
 
     id: str
@@ -73,8 +74,8 @@ MIN_ROOM_FRACTION = 1e-6  # of a limit, that errors without a specification must
 class Broken(NamedTuple):
     """A row in which the errors without a specification leave no room for specified errors.
 
-    `used` is the utilization that these errors alone cause; None if no image forms with them. `requirement` is the
-    requirement of the row.
+    `used` is the utilization due to the errors without a specification alone; None if no image forms with them.
+    `requirement` is the requirement of the row.
     """
 
     id: str
@@ -86,10 +87,11 @@ class Broken(NamedTuple):
 class SpecificationSheet(NamedTuple):
     """Specifications for the errors of one mission that together meet every requirement.
 
-    `findings` are the findings of a check with the ordered values, `status` is its status, and `requirements` are the
-    requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows without room
-    for specified errors. If there is such a row, the specifications have no values. `reserve` is the fraction of
-    every limit that is kept free. `notes` name the differences between the checked mission and the mission file.
+    `findings` are the findings of a check with the specified values, `status` is its status, and `requirements` are
+    the requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows in which
+    the errors without a specification leave no room. If there is such a row, the specifications have no values.
+    `reserve` is the fraction of every limit that is kept free. `notes` name the differences between the checked
+    mission and the mission file.
     """
 
     file: str
@@ -110,10 +112,10 @@ class SpecificationSheet(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission meets every requirement with the ordered values."""
+        """Whether the mission meets every requirement with the specified values."""
         return not self.broken and exit_code({self.status}, strict=False) == 0
 
     @property
     def ordered(self) -> tuple[SetValue, ...]:
-        """Changes of the mission file with which `check` uses the ordered values."""
+        """Changes to the mission file that make `check` use the specified values."""
         return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))

@@ -1,4 +1,4 @@
-"""The statuses of rows, missions and runs, with their effect on the verdict and their words in every format.
+"""The statuses of rows, missions and runs, with their effect on the verdict and their names in every format.
 
 A new status needs one entry here, and a rule that assigns it (`budget.judged_rows`).
 """
@@ -100,7 +100,7 @@ STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 
 
 def worst(statuses: Iterable[str]) -> str:
-    """Return the worst of the statuses that a mission can have; `pass` if there is none of them."""
+    """Return the worst of the statuses that a mission can have; `pass` if `statuses` has no such status."""
     return min((name for name in statuses if STATUS[name].gates), key=RANK.__getitem__, default="pass")
 
 
@@ -113,9 +113,9 @@ def complying(counts: Mapping[str, int]) -> int:
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:
-    """Return the exit code of a run: 2 if a file is unusable, 1 if a requirement is broken or not judged, else 0.
+    """Return the exit code of a run: 2 if a file is unusable, 1 if a requirement is not met or not judged, else 0.
 
-    With `strict` the code is 1 also for warnings.
+    With `strict`, the code is also 1 for warnings.
     """
     if "error" in statuses:
         return 2

@@ -16,9 +16,9 @@ Floats = NDArray[np.float64]
 class Axis(NamedTuple):
     """One varied key of a plot.
 
-    `values` (n,) are in `unit` and in rising order; `scale` is the SI value of one `unit`. For a key with words,
-    `values` are the indices of `words`, from 0. `own` is the value of the key in the mission itself; None if the
-    mission has no value, or if its word is not in `words`.
+    `values` (n,) are in `unit` and in ascending order; `scale` is the SI value of one `unit`. For a key whose values
+    are names, `words` are these names, and `values` are their indices from 0. `own` is the value of the key in the
+    mission itself; None if the mission has no value, or if its name is not in `words`.
     """
 
     key: str
@@ -63,11 +63,12 @@ class Trade(NamedTuple):
 class TradeStudy(NamedTuple):
     """A sweep that the report of a mission shows.
 
-    `asked` are the texts of the options. If a single key varies, `rows` are the utilizations of all rows that are the
-    worst at any value, as functions of the key. `cases` is the number of all cases. Of these, `complying` cases meet
-    every requirement, `waived` cases are waived by the waivers `waived_by`, `unevaluated` cases could not be
-    evaluated completely or declare no error, and `missing` cases give no usable mission. `model` is the model that
-    an option put in place of the mission's own model. `day` is the date on which waivers were judged.
+    `asked` are the values of the options `--vary`. If a single key varies, `rows` has the utilization, as a function
+    of the key, of each row that is the worst for at least one value. `cases` is the number of all cases. Of these,
+    `complying` cases meet every requirement, `waived` cases are waived by the waivers `waived_by`, `unevaluated`
+    cases could not be evaluated completely or declare no error, and `missing` cases give no usable mission. `model`
+    is the model that an option put in place of the mission's own model. `day` is the date on which waivers were
+    judged.
     """
 
     asked: tuple[str, ...]

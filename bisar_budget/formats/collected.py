@@ -1,4 +1,4 @@
-"""Data that the import takes from a radar file (scene, band, aperture, paths, errors), and the mission file of them.
+"""Data that are imported from a radar file (scene, band, aperture, paths, errors), and the resulting mission file.
 
 Slow time is the time at which a pulse is at the scene point. The pulse leaves the transmitter R_t/c earlier and
 reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. At a slow time, the path of the transmitter
@@ -8,8 +8,8 @@ of both ranges at a slow time is therefore the range sum of that pulse.
 `ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1, state sigmas of position and velocity, P1 to
 V3, with their correlations. CRSD 1.0 and the bistatic part of SICD state covariance matrices. SICD, volume 3, defines
 the frames of the errors. ECF is fixed to the Earth. RIC_ECF has radial, in-track and cross-track axes, which are
-computed with the velocity relative to the rotating Earth. RIC_ECI has the same axes, computed with the velocity
-relative to the stars; a mission file calls it `ric`.
+computed with the velocity relative to the rotating Earth. RIC_ECI has the same axes, computed with the inertial
+velocity; a mission file calls it `ric`.
 """
 
 import json
@@ -250,11 +250,11 @@ def declared(
 ) -> tuple[DeclaredMotionError, list[str]]:
     """Convert the errors of one platform from the frame of a radar file to a frame of a mission file.
 
-    `covariance` (6, 6) is that of position and velocity in the frame that the element `frame` names. Errors in ECF
-    are rotated to the axes of the scene. RIC_ECI is the frame `ric` of a mission, and needs no rotation. Errors in
-    RIC_ECF are rotated about the radial axis to `ric`; for a platform in free fall, their velocities are also
-    converted to velocities relative to the stars. Returns the errors, and remarks that describe the conversion. If
-    the converted errors have no correlations, their `correlation` is empty.
+    `covariance` (6, 6) is the covariance of position and velocity in the frame that the element `frame` names. Errors
+    in ECF are rotated to the axes of the scene. RIC_ECI is the frame `ric` of a mission, and needs no rotation.
+    Errors in RIC_ECF are rotated about the radial axis to `ric`; for a platform in free fall, their velocities are
+    also converted to inertial velocities. Returns the errors, and remarks that describe the conversion. If the
+    converted errors have no correlations, their `correlation` is empty.
     """
     name = frame.text()
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
@@ -294,7 +294,7 @@ def declared(
 
 
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
-    """Unit vectors, in the axes of the scene, of the frame `name` (ECF, RIC_ECF or RIC_ECI) of a radar file."""
+    """Unit vectors of the frame `name` (ECF, RIC_ECF or RIC_ECI) of a radar file, in the axes of the scene."""
     if name == "ECF":
         x, y, z = zip(*axes.axes, strict=True)
         return x, y, z
@@ -442,9 +442,9 @@ def of_matrices(
 ) -> FileErrors:
     """Read the errors that `ErrorParameters/SARImage` of CRSD or a bistatic SICD states as covariance matrices.
 
-    `parameters` is the element that contains `Monostatic` or `Bistatic`, or the bistatic element itself. The first of
-    `names` is the element with the covariances of position and velocity. The second of `names` is the element with
-    the covariance of the times and clock frequencies; `clocks` are the indices of both clock frequencies in it.
+    `parameters` is the element that contains `Monostatic` or `Bistatic`, or the bistatic element itself. `names` are
+    the names of two elements: the first has the covariances of position and velocity, and the second the covariance
+    of the times and clock frequencies. `clocks` are the indices of both clock frequencies in the second covariance.
     """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
@@ -516,7 +516,7 @@ _BENDS = (
 
 
 def mission_tree(imported: Imported) -> JsonObject:
-    """Return the content of a mission file as nested dictionaries, in which quantities are texts with usual units."""
+    """Return the content of a mission file as nested dictionaries, with quantities as strings in customary units."""
     tree: JsonDocument = {
         "schema_version": 1,
         "name": imported.name,

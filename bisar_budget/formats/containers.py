@@ -102,7 +102,7 @@ class Element:
         return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First element at a path that has a child `child` with the text `text`; None if there is none."""
+        """First of the elements at a path whose child element `child` has the text `text`; None if there is none."""
         return next(
             (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
         )
@@ -147,7 +147,7 @@ class Element:
         return coefficients
 
     def path_polynomial(self, path: str) -> Floats:
-        """Read the coefficients (order + 1, 3) of the polynomials of time that give the position X, Y and Z."""
+        """Read the coefficients (order + 1, 3) of a position as polynomials of time, with the columns X, Y and Z."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)

@@ -304,7 +304,7 @@ class AnswerResult:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class _Found(AnswerResult):
+class _FindingsResult(AnswerResult):
     """Base class of results that wrap the findings `found` and have all attributes of `found`."""
 
     found: Any
@@ -333,7 +333,7 @@ def _waived(waivers: Sequence[Sequence[str]]) -> str:
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
 
-class SolveResult(_Found):
+class SolveResult(_FindingsResult):
     """Result of `solve`: the values at which compliance begins or ends.
 
     For a number, the result has the attributes `value` in SI, `crossings`, `status` and `nearest`. For a key that
@@ -358,7 +358,7 @@ class SolveResult(_Found):
         return f"{self.value:.6g} {self.unit}{waived_words}"
 
 
-class SensitivityResult(_Found):
+class SensitivityResult(_FindingsResult):
     """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
 
     COMMAND: ClassVar[str] = "sensitivity"
@@ -378,7 +378,7 @@ class SensitivityResult(_Found):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class AllocateResult(_Found):
+class AllocateResult(_FindingsResult):
     """Result of `allocate`: specifications that together meet every requirement.
 
     The attributes `specifications`, `complies` and `requirements` are those of `found`. If `allocate` was given the
@@ -400,7 +400,7 @@ class AllocateResult(_Found):
         return [(self.found, self.offer)]
 
 
-class VerifyResult(_Found):
+class VerifyResult(_FindingsResult):
     """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
 
     COMMAND: ClassVar[str] = "verify"
@@ -414,7 +414,7 @@ class VerifyResult(_Found):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class PassesResult(_Found):
+class PassesResult(_FindingsResult):
     """Result of `passes`: a sequence of the passes of a satellite, each with the verdict of the mission in it.
 
     `mission` and `model` are the arguments of the function `passes`.
@@ -462,7 +462,7 @@ class PassesResult(_Found):
         return Picture(title, partial(drawing_file, sky_plot(self.found, title, verdict(self.found))))
 
 
-class MonteCarloResult(_Found):
+class MonteCarloResult(_FindingsResult):
     """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
 
     `probability` is the probability that all requirements are met together, and `requirements` has an entry for each

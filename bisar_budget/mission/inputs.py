@@ -8,8 +8,6 @@ from typing import NamedTuple
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import is_file
-from bisar_budget.mission.paths import reader_of
-from bisar_budget.paths.flight import PathFileError
 from bisar_budget.resources import resource
 
 
@@ -38,6 +36,9 @@ def _input_files(mission: Mission) -> Iterator[InputFile]:
     folder = folder_of(mission.file)
     yield InputFile("mission", mission.file, mission.file, sha256(mission.data).hexdigest())
     if name := getattr(mission.requirements, "file", None):
+        from bisar_budget.mission.paths import reader_of  # imports the readers of all paths
+        from bisar_budget.paths.flight import PathFileError
+
         try:
             digest = sha256(reader_of(folder)(name)).hexdigest()
         except PathFileError:  # it was removed after the mission was read

@@ -57,7 +57,7 @@ def orbit_error(
 
     # Both directions of time are integrated at once, (directions, orbits, 3).
     way = np.array((1.0, -1.0))[:, None, None]
-    places, velocities = (np.stack((state, state)) for state in ((r, wrong_r), (v, wrong_v)))
+    positions, velocities = (np.stack((state, state)) for state in ((r, wrong_r), (v, wrong_v)))
 
     def fallen(there: Floats, half_steps: int) -> Floats:
         """Inertial acceleration on both orbits at the positions `there`, in axes fixed at mid-aperture."""
@@ -66,18 +66,20 @@ def orbit_error(
         return pulled
 
     apart = np.empty((_STEP_COUNT + 1, 2, 3))
-    apart[0] = places[:, 1] - places[:, 0]
+    apart[0] = positions[:, 1] - positions[:, 0]
     for index in range(_STEP_COUNT):
-        stride, first = way * step, fallen(places, 2 * index)
+        stride, first = way * step, fallen(positions, 2 * index)
         second_velocities = velocities + stride / 2 * first
-        second = fallen(places + stride / 2 * velocities, 2 * index + 1)
+        second = fallen(positions + stride / 2 * velocities, 2 * index + 1)
         third_velocities = velocities + stride / 2 * second
-        third = fallen(places + stride / 2 * second_velocities, 2 * index + 1)
+        third = fallen(positions + stride / 2 * second_velocities, 2 * index + 1)
         fourth_velocities = velocities + stride * third
-        fourth = fallen(places + stride * third_velocities, 2 * index + 2)
-        places = places + stride / 6 * (velocities + 2 * second_velocities + 2 * third_velocities + fourth_velocities)
+        fourth = fallen(positions + stride * third_velocities, 2 * index + 2)
+        positions = positions + stride / 6 * (
+            velocities + 2 * second_velocities + 2 * third_velocities + fourth_velocities
+        )
         velocities = velocities + stride / 6 * (first + 2 * second + 2 * third + fourth)
-        apart[index + 1] = places[:, 1] - places[:, 0]
+        apart[index + 1] = positions[:, 1] - positions[:, 0]
     later = np.einsum("kji,kj->ki", turns[::2], apart[:, 0])
     earlier = np.einsum("kij,kj->ki", turns[::2], apart[:, 1])
     differences = np.concatenate((earlier[:0:-1], later))
@@ -91,22 +93,24 @@ def _fit() -> Floats:
     return np.asarray(np.linalg.pinv(np.polynomial.legendre.legvander(times, _ORDER)))
 
 
-def _gravity(places: Floats, rotation: Floats) -> Floats:
+def _gravity(positions: Floats, rotation: Floats) -> Floats:
     """Gravity at positions (..., 3) relative to the Earth's centre. [m/s²]
 
     The Earth's axis is along `rotation`, its rate of rotation. Gravity is the gradient of the potential
     (μ/r)·[1 − J₂·(R/r)²·(3z²/r² − 1)/2], where z is the component along the axis and R the equatorial radius. Without
     rotation the Earth is a sphere.
     """
-    distance = np.sqrt((places * places).sum(axis=-1, keepdims=True))
+    distance = np.sqrt((positions * positions).sum(axis=-1, keepdims=True))
     pull = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / (distance * distance * distance)
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
-        return np.asarray(pull * places)
+        return np.asarray(pull * positions)
     pole = rotation / rate
-    along = (places @ pole)[..., None]
+    along = (positions @ pole)[..., None]
     oblate = 1.5 * J2_FACTOR * (EQUATORIAL_RADIUS_M / distance) ** 2
-    return np.asarray(pull * (places + oblate * ((1 - 5 * (along / distance) ** 2) * places + 2 * along * pole)))
+    return np.asarray(
+        pull * (positions + oblate * ((1 - 5 * (along / distance) ** 2) * positions + 2 * along * pole))
+    )
 
 
 def _turned_by(rotation: Floats, times: Floats) -> Floats:

@@ -11,7 +11,7 @@ import pytest
 from bisar_budget.design.allocate import allocate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing.share_bars import limiting, share_bars
-from bisar_budget.report.words.names import in_words
+from bisar_budget.report.words.key_names import in_words
 from tests.conftest import ROOT, TODAY, mission_text
 
 KEY = "platforms.receiver.motion_error.velocity"

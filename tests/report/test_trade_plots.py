@@ -35,7 +35,7 @@ from bisar_budget.report.drawing.trades import (
     thinned,
 )
 from bisar_budget.report.tables import Described
-from bisar_budget.report.words.names import in_words, key_beside
+from bisar_budget.report.words.key_names import in_words, key_beside
 from tests.conftest import ROOT, examples
 from tests.drawing import SVG, Drawing
 

@@ -47,7 +47,7 @@ def as_xlsx(report: Report, style: Style) -> bytes:
     return xlsx.workbook(document(report, style), records(report))
 
 
-_MAX_BRIEF_ROWS = 12  # largest number of rows of a notebook
+_MAX_NOTEBOOK_ROWS = 12  # largest number of rows of a notebook
 
 
 def brief(findings: MissionFindings) -> doc.AnswerDocument:
@@ -68,11 +68,11 @@ def brief(findings: MissionFindings) -> doc.AnswerDocument:
                     use_words(shown_use(row)),
                     doc.Badge(row.status),
                 ]
-                for row in rows[:_MAX_BRIEF_ROWS]
+                for row in rows[:_MAX_NOTEBOOK_ROWS]
             ],
         ),
         doc.Paragraph(
-            f"{declared_words(findings.kinds)} {len(findings.rows) - len(rows[:_MAX_BRIEF_ROWS])} rows more: "
+            f"{declared_words(findings.kinds)} {len(findings.rows) - len(rows[:_MAX_NOTEBOOK_ROWS])} rows more: "
             "to_dataframe()."
         ),
     ]

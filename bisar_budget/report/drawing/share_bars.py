@@ -7,7 +7,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import RowUse, SpecificationSheet
 from bisar_budget.report.drawing import svg
-from bisar_budget.report.words.names import in_words, key_beside
+from bisar_budget.report.words.key_names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent
 
 _SHARES_WIDTH_PX = 860.0  # of the drawing

@@ -7,7 +7,7 @@ slant range.
 from bisar_budget.design.sensitivity import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing import svg
-from bisar_budget.report.words.names import in_words, key_beside
+from bisar_budget.report.words.key_names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent
 
 MAX_BAR_COUNT = 20

@@ -25,7 +25,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.drawing.trades import borders, cell_edges, level_lines, per_word, regions, runs, thinned
-from bisar_budget.report.words.names import in_words, key_beside
+from bisar_budget.report.words.key_names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent
 
 _TRADE_WIDTH_PX, _TRADE_HEIGHT_PX = 560.0, 270.0  # width of a drawing, height of its frame

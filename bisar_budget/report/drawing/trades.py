@@ -15,7 +15,7 @@ from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described
-from bisar_budget.report.words.names import in_words
+from bisar_budget.report.words.key_names import in_words
 
 MAX_PLOT_CASES = 4_000_000  # of a plot, about as many as a screen has pixels
 MAX_ROWS = 7  # rows with a curve each

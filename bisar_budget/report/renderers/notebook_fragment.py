@@ -5,7 +5,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.renderers.html import blocks_as_html
 
-_TONES = "".join(
+_STATUS_TONES = "".join(
     f".bisar-budget .{status.name} {{ --tone: var(--{status.color}) }}\n" for status in STATUS.values()
 )  # a status has the same colour as on a page
 
@@ -13,4 +13,4 @@ _TONES = "".join(
 def fragment(document: doc.AnswerDocument) -> str:
     """Write the chapters of a document, one after another, with a style sheet of their own."""
     chapters = (f"{blocks_as_html(chapter.blocks)}" for chapter in document.chapters)
-    return notebook.page(f"<style>{_TONES}</style>", *chapters)
+    return notebook.page(f"<style>{_STATUS_TONES}</style>", *chapters)

@@ -153,9 +153,9 @@ def _coloured(row: doc.Line, text: str, style: Style) -> str:
     """Colour the statuses of a row in `text`, which is the line of this row."""
     if not style.color:
         return text
-    for place, cell in enumerate(row):
+    for column, cell in enumerate(row):
         if isinstance(cell, doc.Badge):
             word = _badge_words(cell.status)
-            start = "" if not place else " "
+            start = "" if not column else " "
             text = text.replace(f"{start}{word}", start + style.coloured(word, _sgr(cell.status)), 1)
     return text
