@@ -47,8 +47,11 @@ def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
     states: dict[str, WorkTree] = {}
     tops: dict[str, str] = {}
     for file, input_paths in inputs.items():
-        folder = os.path.dirname(os.path.realpath(file))
-        if file == "-" or not _is_below_git(folder):
+        try:
+            folder = os.path.dirname(os.path.realpath(file))
+        except ValueError:  # the name has a NUL
+            folder = ""
+        if not folder or file == "-" or not _is_below_git(folder):
             states[file] = _NOT_IN_REPOSITORY
             continue
         if folder not in tops:

@@ -9,10 +9,10 @@ from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.sampling.probability import monte_carlo
-from tests.conftest import mission_text
+from tests.conftest import TEXT_FORMATS, mission_text
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def counted(monkeypatch) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("detail", ["summary", "full"])
-@pytest.mark.parametrize("format_name", FORMATS)
+@pytest.mark.parametrize("format_name", TEXT_FORMATS)
 def test_every_format_needs_one_analysis(counted, format_name: str, detail: str) -> None:
     found = check_mission(parse_mission(mission_text()), date(2026, 1, 1))
     render(format_name, Report(version="", missions=(found,)), Style(detail=detail, verbosity=1))

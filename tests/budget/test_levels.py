@@ -5,8 +5,8 @@ import json
 import pytest
 
 from bisar_budget.findings.mission import Report
-from bisar_budget.report import FORMATS, Style, render
-from tests.conftest import findings, row
+from bisar_budget.report import Style, render
+from tests.conftest import TEXT_FORMATS, findings, row
 
 SPECTRUM = {"spectrum": {"20 Hz": "1 g^2/Hz", "1 kHz": "1 g^2/Hz"}}
 SHIFTED = {
@@ -18,7 +18,7 @@ SHIFTED = {
 
 
 @pytest.mark.parametrize("key", SHIFTED)
-@pytest.mark.parametrize("format_name", sorted(FORMATS))
+@pytest.mark.parametrize("format_name", sorted(TEXT_FORMATS))
 def test_a_level_is_among_the_overrides_in_every_format(format_name: str, key: str) -> None:
     found = findings(**SHIFTED[key], requirements__islr="-20 dB")
     (override,) = found.overrides

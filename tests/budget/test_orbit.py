@@ -7,8 +7,8 @@ import pytest
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import exit_code
 from bisar_budget.paths.earth import free_fall
-from bisar_budget.report import FORMATS, Style, render
-from tests.conftest import ROOT, findings
+from bisar_budget.report import Style, render
+from tests.conftest import ROOT, TEXT_FORMATS, findings
 
 SATELLITE = {"position": ["353.9 km", 0, "505.4 km"], "velocity": [0, "7.6 km/s", 0]}
 POLAR = {
@@ -129,7 +129,9 @@ def test_a_geostationary_satellite_needs_the_latitude_in_long_apertures(aperture
     assert len(doubts) == (status == "warn")
 
 
-@pytest.mark.parametrize("format_name", sorted(set(FORMATS) - {"csv", "needs"}))  # formats of rows alone
+@pytest.mark.parametrize(
+    "format_name", sorted(set(TEXT_FORMATS) - {"csv", "needs", "requirements", "sdoc"})
+)  # of rows, of requirements
 def test_every_format_offers_it(format_name: str) -> None:
     found = findings(platforms__transmitter=SATELLITE, **DECLARED)
     text = render(format_name, Report(version="0", missions=(found,)), Style())

@@ -11,9 +11,9 @@ from bisar_budget.analysis.spread import Simulation
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.words.requirements import requirement_lines, use_remarks
-from tests.conftest import findings, row
+from tests.conftest import TEXT_FORMATS, findings, row
 
 T, WAVELENGTH = 6.0, 299_792_458.0 / 10e9
 TRANSMITTER = "platforms__transmitter__motion_error"
@@ -186,7 +186,7 @@ class TestWords:
         assert "receiver's share: " in lines["quadratic_phase_error"].remark
         assert lines["quadratic_phase_error"].remark.endswith(" of 22.5 deg")
 
-    @pytest.mark.parametrize("format_name", FORMATS)
+    @pytest.mark.parametrize("format_name", TEXT_FORMATS)
     def test_every_format_has_the_share_beside_the_requirement(self, format_name: str) -> None:
         found = checked("rss", **{f"{RECEIVER}__acceleration": ["2 mm/s^2", 0, 0]})
         one = requirement(found)
@@ -244,7 +244,7 @@ class TestConfidence:
         first = " ".join(written("text", found).partition("\nbase; ")[0].split())
         assert f"every requirement is judged and met {confidence}" in first
 
-    @pytest.mark.parametrize("format_name", [one for one in FORMATS if one not in ("github", "sarif")])
+    @pytest.mark.parametrize("format_name", [one for one in TEXT_FORMATS if one not in ("github", "sarif")])
     def test_every_format_of_a_verdict_says_it(self, format_name: str) -> None:
         """GitHub's annotations and SARIF have findings alone, and this mission has none."""
         assert "with coverage factor 2" in written(format_name, findings(**self.SIGMA, **self.TWICE))

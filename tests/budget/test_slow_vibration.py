@@ -9,9 +9,9 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.explain.explanation import explain
-from tests.conftest import TODAY, findings, mission_text, row
+from tests.conftest import TEXT_FORMATS, TODAY, findings, mission_text, row
 from tests.report.test_report_explanation import evaluated, sums
 from tests.responses import energy_within
 
@@ -195,7 +195,7 @@ def test_a_vibration_of_nothing_passes() -> None:
     assert (found.status, found.utilization, found.margin) == ("pass", 0.0, None)
 
 
-@pytest.mark.parametrize("format_name", sorted(FORMATS))
+@pytest.mark.parametrize("format_name", sorted(TEXT_FORMATS))
 def test_every_format_has_it(format_name: str) -> None:
     found = swaying((1e-2, 0.5), requirements={"cubic_phase_error": 0.3})
     text = render(format_name, Report(version="0", missions=(found,)), Style()).replace("\\", "")

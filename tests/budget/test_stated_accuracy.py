@@ -14,9 +14,8 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.report import FORMATS
 from tests.budget.test_input_doubt import statuses
-from tests.conftest import TODAY, row
+from tests.conftest import TEXT_FORMATS, TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight, geodetic_csv
@@ -30,7 +29,7 @@ PLAN = "the orbit is the plan: neither its age nor its interpolation counts"
 _PASSES = ("passes", "--from", "2026-06-01", "--days", "1")
 COMMANDS = [
     ("check", "-q"),
-    *(("check", "--format", name) for name in FORMATS),
+    *(("check", "--format", name) for name in TEXT_FORMATS),
     ("check", "--explain", "transmitter.velocity.x"),
     *((*_PASSES, "--format", name) for name in ("text", "csv", "json", "ics")),
     ("sweep", "--vary", "collection.aperture_time=1s:2s:2"),

@@ -38,10 +38,10 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import mission_schema
 from bisar_budget.mission.tree import MAX_FAULT_COUNT
 from bisar_budget.mission.vibrations import Spectrum
-from bisar_budget.report import FORMATS, Style, render
+from bisar_budget.report import Style, render
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.workers import worker_pool
-from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
+from tests.conftest import APART, ROOT, TEXT_FORMATS, TODAY, findings, heed_signals, mission_text
 from tests.fuzz import RAW, RUN, case, from_schema
 from tests.mission.test_path_files import satellite
 from tests.paths.orbit_files import TLE
@@ -226,7 +226,9 @@ class TestInterrupted:
     def test_images(self, folder, monkeypatch, option: str, name: str) -> None:
         report = folder / "reports" / name
         report.write_text("old")
-        monkeypatch.setattr(point_plot, "drawn", lambda *given: b"a sheet")  # what is in it does not matter here
+        monkeypatch.setattr(
+            point_plot, "drawn", lambda *given, **options: b"a sheet"
+        )  # what is in it does not matter here
         chmod = os.chmod
         monkeypatch.setattr(os, "chmod", lambda *given: (os.kill(os.getpid(), signal.SIGTERM), chmod(*given)))
         before = signal.signal(signal.SIGTERM, end)
@@ -613,7 +615,7 @@ class TestTerminal:
         assert is_harmless(done)
 
     @pytest.mark.skipif(sys.platform == "win32", reason="no such names there")
-    @pytest.mark.parametrize("format_name", FORMATS)
+    @pytest.mark.parametrize("format_name", TEXT_FORMATS)
     def test_names_and_content(self, tmp_path, format_name: str) -> None:
         inert = f"{COMMANDS}\u200b\u200e\u061c"  # a mission file may have these, other controls are faults
         content = {
@@ -648,7 +650,7 @@ class TestTerminal:
 
     def test_our_own_reports_need_no_escape(self) -> None:
         """A style sheet is not text: there an escape would be an error."""
-        for format_name in FORMATS:
+        for format_name in TEXT_FORMATS:
             text = render(format_name, Report(version="", missions=(findings(),)), Style(detail="full"))
             assert harmless(text, format_name) == text
 
@@ -1034,7 +1036,7 @@ class TestFilesThatChange:
             resources.release_files()
 
 
-@pytest.mark.parametrize("format_name", list(FORMATS))
+@pytest.mark.parametrize("format_name", list(TEXT_FORMATS))
 def test_a_waiver_of_an_option_has_no_line(mission, format_name: str) -> None:
     """It was a waiver of line None."""
     waiver = "waivers=[{id: timing.quadratic, until: 2027-01-01, reason: r}]"

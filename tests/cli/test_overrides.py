@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bisar_budget.report import FORMATS
-from tests.conftest import COMPLIES, ROOT, mission_text
+from tests.conftest import COMPLIES, ROOT, TEXT_FORMATS, mission_text
 
 WAIVED = mission_text(
     **COMPLIES,
@@ -82,7 +81,7 @@ class TestDay:
         found = overrides(run, "waived.yaml", env=EPOCH)
         assert found == [("--date", "2023-11-14", "environment, SOURCE_DATE_EPOCH")]
 
-    @pytest.mark.parametrize("format_name", FORMATS)
+    @pytest.mark.parametrize("format_name", TEXT_FORMATS)
     def test_every_format(self, run, folder, format_name: str) -> None:
         text = readable(run("check", "waived.yaml", "--format", format_name, env=EPOCH).stdout)
         assert "2023-11-14" in text
@@ -96,7 +95,7 @@ class TestDay:
         assert overrides(run, "m.yaml", env=EPOCH) == []
 
 
-@pytest.mark.parametrize("format_name", FORMATS)
+@pytest.mark.parametrize("format_name", TEXT_FORMATS)
 def test_every_format_says_that_a_setting_exits_with_0(run, folder, format_name: str) -> None:
     (folder / "pyproject.toml").write_text("[tool.bisar-budget]\nexit-zero = true\n")
     (folder / "m.yaml").write_text(mission_text(), encoding="utf-8")
@@ -129,7 +128,7 @@ class TestParts:
         self.copy(project, "stim300")
         found = overrides(run, "m.yaml")
         assert found == [("part stim300", "parts/stim300.yaml", "the project's, in place of the catalogue's")]
-        for format_name in FORMATS:
+        for format_name in TEXT_FORMATS:
             text = readable(run("check", "m.yaml", "--format", format_name).stdout)
             assert "parts/stim300.yaml" in text.replace("<wbr>", ""), format_name
 

@@ -74,6 +74,7 @@ _CHECK_GRAMMAR = {
         "STATEMENT": True,
         "KEY": False,
         "LIMIT": False,
+        "COMMENT": False,
     },
     _RESULT: {"UID": True, "STATUS": True, "TITLE": True, "STATEMENT": True, "COMMENT": False},
 }
@@ -89,12 +90,13 @@ class _Required:
     statuses: list[str] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
     limits: list[str] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
 
     def node(self, uid: str) -> StrictNode:
         """Node of the requirement with the given UID. Its status is the worst of all its statuses."""
         fields = {"UID": uid, "STATUS": worst(self.statuses), "TITLE": _unique(self.titles)}
         texts = {"STATEMENT": _unique(self.statements, " "), "KEY": _unique(self.keys), "LIMIT": _unique(self.limits)}
-        return StrictNode(fields | texts)
+        return StrictNode(fields | texts | {"COMMENT": _unique(self.findings)})
 
 
 @dataclass
@@ -164,6 +166,7 @@ def _add_requirements(
             node.statuses.append(requirement.status)
             node.keys.append(requirement.key)
             node.limits.append(limit_of_file(requirement, mission))
+            node.findings.append(requirement_finding(requirement, mission))
         row = rows.get(requirement.row or "")
         if row is not None:
             _result_of(row, mission, identity, results).required += above

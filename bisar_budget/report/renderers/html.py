@@ -176,11 +176,15 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
     """Write a table cell, or an entry of a list of facts, as an element with the style class of its text."""
+    content = _text(text)
     if isinstance(text, doc.Styled):
-        style, text = text.style, text.text
+        style = text.style
+        content = (
+            escape(printable(text.text)) if isinstance(text.text, str) and style == "digest" else _text(text.text)
+        )
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
     styled = Markup(' class="{}"').format(style) if style else ""
-    return Markup("<{0}{1}{2}>{3}</{0}>").format(tag, scoped, styled, _text(text))
+    return Markup("<{0}{1}{2}>{3}</{0}>").format(tag, scoped, styled, content)
 
 
 def _item(paragraphs: doc.Line) -> Markup:
