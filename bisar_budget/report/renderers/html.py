@@ -180,7 +180,7 @@ def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
     if isinstance(text, doc.Styled):
         style = text.style
         content = (
-            escape(printable(text.text)) if isinstance(text.text, str) and style == "digest" else _text(text.text)
+            Markup.escape(printable(text.text)) if isinstance(text.text, str) and style == "digest" else _text(text.text)
         )
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
     styled = Markup(' class="{}"').format(style) if style else ""
