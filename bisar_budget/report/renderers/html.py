@@ -179,9 +179,8 @@ def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
     content = _text(text)
     if isinstance(text, doc.Styled):
         style = text.style
-        content = (
-            Markup.escape(printable(text.text)) if isinstance(text.text, str) and style == "digest" else _text(text.text)
-        )
+        is_digest = style == "digest" and isinstance(text.text, str)
+        content = _text(text) if is_digest else _text(text.text)
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
     styled = Markup(' class="{}"').format(style) if style else ""
     return Markup("<{0}{1}{2}>{3}</{0}>").format(tag, scoped, styled, content)
