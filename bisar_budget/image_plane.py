@@ -245,9 +245,9 @@ class GroundMatrix:
 def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
     """Signed area of the parallelogram that the mean range gradient and the mean Doppler gradient span.
 
-    It is set to 0 if the aperture resolves much more than these two gradients, so that they contribute only a small
-    part of the determinant of H. The first three parameters are fields of `GroundMatrix`, and the last is the
-    determinant of H.
+    The result is 0 if these two gradients contribute only a small part of the determinant of H, because the
+    resolution comes mostly from further variations of the gradient over the aperture. The first three parameters are
+    fields of `GroundMatrix`, and the last is the determinant of H.
     """
     (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
     area = x * by_y - y * by_x

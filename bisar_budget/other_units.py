@@ -201,9 +201,9 @@ def value_of_unit(unit: str) -> UnitValue | None:
 
 
 def _product(tokens: list[str]) -> UnitValue | None:
-    """Value of a product of units that ends at a closing bracket or at the end; its tokens are removed from the list.
+    """Parse a product of units, up to a closing bracket or the end of the tokens, and return its value.
 
-    The result is None if a unit is unknown.
+    The parsed tokens are removed from `tokens`; the closing bracket is kept. The result is None if a unit is unknown.
     """
     value = UnitValue(1.0)
     sign = 1.0

@@ -1,6 +1,6 @@
 """Quantities as text: read `9.6 GHz` as a number in SI, and write such a number as `9.60 GHz`.
 
-The module has its own small table of units, because general unit libraries read `3 dBi` as three ampere.
+The module has its own small table of units, because general unit libraries read `3 dBi` as three amperes.
 """
 
 import math

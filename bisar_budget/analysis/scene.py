@@ -199,7 +199,7 @@ class Heights(NamedTuple):
         return Heights(self.height[indices], self.azimuth[indices])
 
     def where(self, is_kept: Booleans, replacements: "Heights") -> "Heights":
-        """Return these values where `is_kept` is true, and the replacements elsewhere, with their azimuths."""
+        """Return these values where `is_kept` is true and `replacements` elsewhere; each value keeps its azimuth."""
         return Heights(*(np.where(is_kept, *both) for both in zip(self, replacements, strict=True)))
 
     def put(self, indices: Selection, heights: "Heights") -> None:

@@ -4,8 +4,8 @@ The random errors are errors of sensors, clocks and air, and slow vibrations. Ea
 variation of a part over the aperture is known, while its size is random. A part is, for example, the bias along one
 axis, or one Legendre order of the noise along one axis. During a collection, a part has the same size for all ground
 points of the scene. The phases that a random error causes at two ground points therefore differ by the
-root-sum-square of the differences of its parts. The difference between the root-sum-squares at the two points would
-be too small.
+root-sum-square of the differences of its parts. Subtracting the root-sum-squares at the two points would
+underestimate this difference.
 
 - An error that moves a platform is projected on the line of sight from each ground point.
 - A clock error moves no platform. The constant and the linear term of its range error displace the image, and this
@@ -19,8 +19,9 @@ be too small.
   to each other, so their effects add. A vibration stated along the line of sight moves the platform along the line of
   sight to the scene centre.
 
-An error that the mission file states only by its effect has this effect at every ground point. Derived here.
-`tests/simulate/test_random_at_scene_edge.py` checks it against exact ranges.
+An error that the mission file states only by its effect has this effect at every ground point.
+
+These relations are derived here. `tests/simulate/test_random_at_scene_edge.py` checks them against exact ranges.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -84,7 +84,7 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty string, for kinds of error that need a single entry and so can never be half stated."""
+    """Return an empty string, for kinds of error that need only a single entry."""
     return ""
 
 
@@ -95,8 +95,8 @@ class _OfPlatform:
     `lacks` names a missing key without which the stated error has no effect; the result is empty if nothing is
     missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
 
-    If `is_owed` is not set, the kind counts as missing only if the file states a part of it. A platform that does not
-    move must declare only the kinds with `is_owed_still`. A kind without `is_listed` counts as other kinds, for
+    If `is_owed` is not set, the kind counts as missing only if the file states a part of it. For a platform that does
+    not move, only the kinds with `is_owed_still` are required. A kind without `is_listed` counts as other kinds, for
     example a covariance as position and velocity. Kinds with `is_clock` are not needed if there is a direct path.
     """
 
@@ -377,7 +377,7 @@ def still_platforms(mission: Mission) -> list[str]:
 def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
     """List the errors that `requirements.declare` requires but the file does not declare, without duplicates.
 
-    The following entries declare a kind of error:
+    A kind of error counts as declared if the file has one of the following entries:
 
     - position and velocity: their own values or a covariance;
     - the clock: any term of its error;
@@ -385,9 +385,8 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     - an inertial sensor: any of its values;
     - the atmosphere: the delays of each leg.
 
-    A platform that does not move must declare only its position. It must also declare its oscillator if the
-    requirement names the platform. An error that both platforms have in common does not declare the errors of either
-    platform alone.
+    For a platform that does not move, only the position is required, and the oscillator if the requirement names the
+    platform. An error that both platforms have in common does not count as a declaration for either platform alone.
 
     Parameters
     ----------

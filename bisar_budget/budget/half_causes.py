@@ -1,9 +1,10 @@
-"""Causes of error of which the file states only one half. Rows that depend on such a cause are not evaluated.
+"""Causes of error that need two entries of the mission file, of which only one is given.
 
-Without this rule, a failing mission could pass after the worse half of a cause is deleted from its file. For two
-kinds of cause, the checks of the file do not require both halves. The first is a pair of clocks, whose halves are the
-two oscillators. The second is the vibration that an oscillator feels, whose halves are tones and noise. If the
-airframe has both, `oscillator.vibration` needs both too, but the file may state only one of them.
+Rows that depend on such a cause are not evaluated. Without this rule, a failing mission could pass after the worse of
+the two entries is deleted from its file. For two kinds of cause, the checks of the file do not require both entries.
+The first is a pair of clocks, which needs the oscillators of both platforms. The second is the vibration that an
+oscillator feels. If the airframe vibrates with tones and noise, `oscillator.vibration` needs both too, but the file
+may state only one of them.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ _HOLD_CLOCKS = (*_HOLD_NOISE, "location_error")
 
 @dataclass(frozen=True)
 class HalfCause:
-    """A cause of error that two entries of the mission file describe, of which only one is given.
+    """A cause of error that needs two entries of the mission file, of which only one is given.
 
     Attributes
     ----------
@@ -49,7 +50,11 @@ class HalfCause:
 
 
 def half_causes(mission: Mission) -> Iterator[HalfCause]:
-    """Yield the causes of error of which the file states only one half."""
+    """Yield the causes of error that need two entries of the mission file, of which only one is given.
+
+    Examples are a pair of clocks with the oscillator of one platform only, and the vibration of an oscillator with
+    its tones but without its noise.
+    """
     yield from _half_clocks(mission)
     for name in PLATFORMS[mission.has_direct_path :]:
         platform = getattr(mission.platforms, name)
@@ -101,9 +106,9 @@ def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Name the key to add if a requirement depends on a cause of which the file states only one half.
+    """Write a note that names the entry to add if a requirement depends on a cause of error that lacks an entry.
 
-    The note is empty if the requirement does not depend on such a cause.
+    Such causes are listed by `half_causes`. The note is empty if the requirement depends on no such cause.
     """
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

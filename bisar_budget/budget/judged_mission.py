@@ -418,7 +418,7 @@ class RowStatuses:
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
-        """Set rows to `not_evaluated` if they depend on a cause of which the file states only one half."""
+        """Set rows to `not_evaluated` if they depend on a cause of error that lacks an entry in the mission file."""
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 

@@ -91,9 +91,10 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 
 
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
-    """Write a note with the required errors that the file does not declare.
+    """Write a note that lists the required errors that the file does not declare.
 
-    Errors that the file does not mention come first, followed by errors of which it states only one half.
+    Errors that the file does not mention come first. They are followed by errors that have no effect without a second
+    entry, which the file lacks, such as a lever arm without an attitude error.
     """
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
@@ -257,9 +258,10 @@ def _share(row: Row, key: str, case: Case, utilization: float | None) -> Decidin
 
 
 def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
-    """Return the owner's share of a requirement and the value that the row reaches, in the requirement's unit.
+    """Return the share of a requirement that is allotted to the owner of a row, and the value that the row reaches.
 
-    Neither number includes the autofocus gain. The unit is [rad] or [dB]. A number that does not exist is None.
+    The owner is a part of the system, such as a platform (`Subject.owner`). `key` is the key of the requirement. Both
+    numbers are in its unit, [rad] or [dB], without the autofocus gain. A number that is not available is None.
     """
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:

@@ -75,7 +75,7 @@ class Slope(NamedTuple):
     Attributes
     ----------
     key, text : str
-        Key of the number, and its value as the file writes it.
+        Key of the number, and its value as written in the file.
     value, unit : float, str
         The value in its unit. For a covariance the value is 1, the factor by which its sigmas are multiplied.
     per, per_text : float, str
@@ -90,15 +90,17 @@ class Slope(NamedTuple):
         Change of the worst utilization, and change of the requested row's utilization. `row_change` is None without a
         requested row.
     row_below, row_above : str
-        Rows with the worst utilization at the lower and at the upper end of the difference, by magnitude.
+        Rows with the worst utilization at the two ends of the difference: where the number is smaller, and where it
+        is larger. A number that is changed by a fraction of itself is compared by magnitude.
     is_mixed : bool
         Whether the row with the worst utilization differs between the ends of the difference and the value of the
         file. The change then mixes the slopes of two rows.
     part : str
         Part of the catalogue from which the number is taken; empty if the file states it.
     measure : float
-        The increase `per` as a dimensionless ratio, so that numbers of all kinds can be compared. The reference is
-        the number itself, a radian, a power, or a slant range.
+        The increase `per` as a dimensionless ratio, so that numbers of all kinds can be compared. It is relative to
+        the number itself. For a direction it is relative to one radian, for a level in decibels to the power, and for
+        a latitude or longitude to the smaller slant range.
     """
 
     key: str
@@ -220,12 +222,13 @@ class Sensitivity(NamedTuple):
 
 # ---------------------------------------------------------------- differences
 class Stated(NamedTuple):
-    """A number of the mission file that the analysis varies; `text` is the number as the file states it.
+    """A number of the mission file that the analysis varies; `text` is the number as written in the file.
 
-    `step` is half of the central difference. `per` is the increase for which effects are given, in SI, and `per_text`
-    is the same increase as text. `part` is this increase as a dimensionless ratio to the number itself, a radian, a
-    power, or the smaller slant range. `others` are further numbers that change with this one: the other shares of its
-    section, because all shares sum to 1. For a covariance the value is a factor by which all sigmas are multiplied.
+    A central difference extends from `step` below the value to `step` above it. `per` is the increase for which
+    effects are given, in SI, and `per_text` is the same increase as text. `part` is this increase as a dimensionless
+    ratio, with the same references as `Slope.measure`. `others` are further numbers that change with this one: the
+    other shares of its section, because all shares sum to 1. For a covariance the value is a factor by which all
+    sigmas are multiplied.
     """
 
     number: Number
@@ -264,8 +267,8 @@ def sensitivity(
     -------
     Sensitivity
         Effects as changes of utilization; 0.01 is 1 % of a limit. The number that uses up the margin with the
-        smallest change comes first. For this comparison, changes are expressed as fractions of a number, a radian, a
-        power, or a range.
+        smallest change comes first. For this comparison, changes are expressed as dimensionless ratios; see
+        `Slope.measure`.
 
     Raises
     ------

@@ -37,10 +37,10 @@ class Subject(NamedTuple):
     """Subject of a row or an error: owner, kind and axis.
 
     The function `subject` creates a subject together with its id. Code reads the fields and never parses an id.
-    `owner` owns the share of the budget that the error uses. It is transmitter, receiver or clock, or mission if no
-    part of the system owns the error. `kind` is the name of a kind in `error_kinds`: a kind of error, such as
-    position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a kind of sum,
-    such as dispersion or specification.
+    `owner` is the part of the system whose share of the budget the error uses: transmitter, receiver or clock. It is
+    mission if the error belongs to no part of the system. `kind` is the name of a kind in `error_kinds`: a kind of
+    error, such as position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a
+    kind of sum, such as dispersion or specification.
 
     The meaning of `axis` depends on the kind. It is the axis of `frame`, the term of the clock, the name of a
     declared value of a sensor or of the air, the name of an error determined elsewhere, the specified key, or the
@@ -93,7 +93,7 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 
 def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
-    """Convert a value to the plain number of one case, given by its index.
+    """Return the value in one case, given by its index, as a float.
 
     A single number, or an array with a single entry, holds for every case.
     """
@@ -103,9 +103,9 @@ def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
 
 
 def _plain_way(component: PerCase) -> PerCase:
-    """Convert a component of a direction to the plain number of a single case.
+    """Convert a component of a direction in a single case to a float.
 
-    A component that varies over the nodes stays an array.
+    A component that varies over the nodes of the aperture, (nodes, cases), stays an array.
     """
     return component if np.ndim(component) > 1 else plain(component)
 

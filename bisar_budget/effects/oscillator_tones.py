@@ -29,7 +29,7 @@ class LeftTone(NamedTuple):
     """Residual tones that synchronization leaves of a tone of amplitude 1.
 
     `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
-    are the amplitudes of the remaining tones; 0 for a frequency that does not occur.
+    are the amplitudes of the residual tones; 0 for a frequency that does not occur.
     """
 
     frequencies: tuple[PerCase, ...]
@@ -41,7 +41,7 @@ class LeftTone(NamedTuple):
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: PerCase) -> list[PerCase]:
-        """Amplitudes with which the remaining tones make echoes.
+        """Amplitudes with which the residual tones make echoes.
 
         A folded tone below one cycle per aperture makes no echo, so its amplitude is 0. A tone that is not folded
         keeps its amplitude at any frequency.
@@ -54,7 +54,7 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> PerCase:
-        """Amplitude with which the remaining tones make echoes.
+        """Amplitude with which the residual tones make echoes.
 
         With a PSLR requirement it is the amplitude of the tone that makes the largest echo. Without this requirement
         it is the root-sum-square of the amplitudes of all tones that make echoes.
@@ -67,7 +67,7 @@ class LeftTone(NamedTuple):
         return largest
 
     def slowest_echo(self, aperture_time: PerCase) -> PerCase:
-        """Lowest frequency of the remaining tones that make echoes with more than 1 % of the original amplitude. [Hz]
+        """Lowest frequency of the residual tones that make echoes with more than 1 % of the original amplitude. [Hz]
 
         For a tone that is not folded it is the tone's own frequency. It is infinite if no tone makes such an echo.
         """
@@ -80,17 +80,17 @@ class LeftTone(NamedTuple):
         return slowest
 
     def place(self, aperture_time: PerCase) -> PerCase:
-        """Frequency of the remaining tone that makes the largest echo. [Hz]"""
+        """Frequency of the residual tone that makes the largest echo. [Hz]"""
         both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
         echoes, frequencies = np.split(both, 2)
         of_largest: PerCase = np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
         return of_largest
 
     def slow_parts(self, aperture_time: PerCase) -> Parts:
-        """Squared Legendre parts, over the aperture, of the sum of all tones below one cycle per aperture. [rad²]
+        """Squared Legendre parts, over the aperture, of summed residual tones below one cycle per aperture. [rad²]
 
-        Each tone is taken in its worst phase. The remaining tones are not independent, so the amplitudes of their
-        parts add.
+        Each tone is taken in its worst phase. The residual tones are not independent of each other, so the amplitudes
+        of their parts add.
         """
         total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):

@@ -76,7 +76,11 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad/unit]"""
+        """Phase per unit of the error that is compared with a limit including the autofocus gain `gain`. [rad/unit]
+
+        The limit is raised for the hidden phase too, although autofocus does not correct it. The hidden phase is
+        therefore multiplied by the gain. See `Declared.judged`.
+        """
         phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
         return phase
 

@@ -229,9 +229,10 @@ def _like(total: Floats, aperture_time: PerCase) -> Parts:
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Legendre parts of a phase with the spectrum x^(−slope) between the angles `low` and `high`, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, (parts, cases).
 
-    The angles are x = πfT. [rad] The first axis (parts) has the integrals listed in `squares`.
+    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
+    the order of `squares`.
     """
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
@@ -245,19 +246,20 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Legendre parts of a phase with the spectrum x^(−slope) from the first panel edge to each edge, (parts, edges).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, up to each edge, (parts, edges).
 
-    The first axis (parts) has the integrals listed in `squares`.
+    The integrals begin at the first panel edge. The first axis (parts) is in the order of `squares`.
     """
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
     return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Legendre parts of a phase with the spectrum x^(−slope) between two angles within one panel, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, in one panel, (parts, cases).
 
-    `low` and `high` (cases,) are the angles x = πfT. [rad] The first axis (parts) has the integrals listed in
-    `squares`. Slow tones and fast tones have their own formulas. The result is 0 for a panel of zero width.
+    The function is used at the ends of a spectrum, which cover a panel only partly. `low` and `high` (cases,) are the
+    limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in the order of `squares`. Low and
+    high frequencies are integrated by formulas of their own. The result is 0 if `low` equals `high`.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -281,20 +283,21 @@ def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Legendre parts of a phase with the spectrum x^(−slope) between two angles of slow tones, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of slow tones, (parts, cases).
 
-    The first axis (parts) has the integrals listed in `squares`. The quadratic and cubic part, the power beyond the
-    cubic, the constant and the linear part of a tone are replaced by their leading powers x²/2, x³/6, x⁸/99225, 1 and
-    x.
+    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
+    the order of `squares`. The quadratic and cubic part, the power beyond the cubic, the constant and the linear part
+    of a tone are replaced by their leading powers x²/2, x³/6, x⁸/99225, 1 and x.
     """
     powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Legendre parts of a phase with the spectrum x^(−slope) between two angles of fast tones, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted with the squared parts of fast tones, (parts, cases).
 
-    The first axis (parts) has the integrals listed in `squares`. Terms that oscillate with the angle x are averaged.
+    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
+    the order of `squares`. Terms that oscillate with the angle x are averaged.
     """
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
@@ -303,7 +306,7 @@ def _fast(slope: float, low: Floats, high: Floats) -> Floats:
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
     """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, over n panels, (parts, n).
 
-    The first axis (parts) has the integrals listed in `squares`. They are computed by Gauss–Legendre quadrature.
+    The first axis (parts) is in the order of `squares`. The integrals are computed by Gauss–Legendre quadrature.
     `low` and `high` (n,) are the ends of the panels, as angles x = πfT. [rad]
     """
     span = np.log(high / low)
@@ -508,8 +511,8 @@ def _over_panels(
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
     """Add to `total` the Legendre parts due to a spectrum above the frequencies `last` [Hz], multiplied by `times`.
 
-    `total` (parts, cases) has the integrals listed in `squares`. `scale` is πT. [s] Terms that oscillate with the
-    angle πfT are averaged.
+    `total` is (parts, cases), with the parts in the order of `squares`. `scale` is πT. [s] Terms that oscillate with
+    the angle πfT are averaged.
     """
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
@@ -521,7 +524,7 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
     """Integrals of a spectrum, weighted with the squared parts of a tone, over n frequency panels, (parts, n).
 
-    The first axis (parts) has the integrals listed in `squares`. They are computed by Gauss–Legendre quadrature.
+    The first axis (parts) is in the order of `squares`. The integrals are computed by Gauss–Legendre quadrature.
     `density` is the spectrum as a function of frequency. `low` and `high` (n,) are the ends of the panels. [Hz]
     `scale` (n,) is πT. [s]
     """

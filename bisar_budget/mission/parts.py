@@ -302,10 +302,10 @@ def _entry(file: str, data: bytes) -> Entry:
 
 
 def _part_of(tree: Tree) -> Part | Invalid:
-    """Read the part from the tree of its file; returns `INVALID` after a report.
+    """Read the part from the tree of its file.
 
-    If the file has no valid kind, the part is read as the kind to which most of its figures belong, so that all
-    faults are reported at once.
+    Faults are reported to the tree, and the result is `INVALID` if the part cannot be used. If the file has no valid
+    kind, the part is read as the kind to which most of its figures belong, so that all faults are reported at once.
     """
     root = tree.root
     kind = root.get("kind")
@@ -468,7 +468,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
-    """Return a mission completed with the figures of the parts that it names, or `INVALID` after a report.
+    """Return a mission completed with the figures of the parts that it names; `INVALID` if a problem is reported.
 
     `find` finds the file of a part, and may raise `PartError`.
     """
@@ -521,7 +521,7 @@ def _parts_of(
 ) -> dict[str, Entry] | Invalid:
     """Find and read the parts that the key at `path` names, at most one of each kind in `kinds`.
 
-    Returns their entries by name, or `INVALID` after a report.
+    Returns their entries by name, or `INVALID` if a problem is reported.
     """
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
@@ -615,7 +615,7 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
 def _with_sensor(
     oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> Oscillator | Invalid:
-    """Complete an oscillator with the figures of the part that it names; returns `INVALID` after a report.
+    """Complete an oscillator with the figures of the part that it names; `INVALID` if a problem is reported.
 
     Figures that come from the part are appended to `taken`. If the file states a figure that the part also states,
     the figure of the file is kept, and the oscillator lists the part's figure as overridden. A phase-noise mask is

@@ -322,7 +322,7 @@ class _Instant(Reader[Instant]):
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: object) -> Instant:
-        """Read an instant of UTC, such as 2026-06-01T05:20:31.250Z, or an instant with an offset from UTC."""
+        """Read an instant in UTC, such as 2026-06-01T05:20:31.250Z, or an instant with an offset from UTC."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None

@@ -84,7 +84,7 @@ GROWTH_FACTORS = SEARCH_SETTINGS.growth_factor ** np.arange(1, 5)
 
 @dataclass(frozen=True, eq=False)
 class LimitSearches:
-    """Searches for the smallest size at which a phase or displacement reaches its limit.
+    """Searches for the smallest error size at which a phase or displacement reaches its limit.
 
     Attributes
     ----------
@@ -143,16 +143,16 @@ class LimitSearches:
 
 @np.errstate(all="ignore")
 def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Floats) -> None:
-    """Find the smallest sizes at which phases and displacements reach their limits, and write them to `smallest`.
+    """Find the smallest error sizes at which phases and displacements reach their limits; write them to `smallest`.
 
     Parameters
     ----------
     paths : PointPaths
-        The paths of the image point.
+        Paths of the image point as the sizes of the errors grow.
     searches : LimitSearches
-        The searches.
+        Limits to search for, each with its path and with the sizes at which the search begins and ends.
     smallest : (requirements, groups)
-        Smallest sizes known so far. A size that a search finds replaces a larger one. [unit]
+        Smallest sizes known so far. Larger sizes are replaced by smaller sizes that the searches find. [unit]
     """
     tries = np.zeros(searches.lane.shape, dtype=int)
     for _ in range(SEARCH_SETTINGS.max_rounds):

@@ -1,9 +1,9 @@
 """Write findings as text. The table of formats names the module of each format; its functions are pure.
 
-The module of a format NAME has a function `as_NAME(report, style) -> str`, such as `as_sarif`. A piecewise format
-writes one mission after another. It has two functions instead, `piece(mission, style) -> str` and
+The module of a format NAME has a function `as_NAME(report, style) -> str`, such as `as_sarif`. A format with
+`is_piecewise` is written mission by mission. Its module has two functions instead, `piece(mission, style) -> str` and
 `joined(pieces, version, style) -> str`, so that a process that checks a mission can write its piece and discard the
-findings. A format with pictures also has a function `pictures(report, style)`.
+findings. A format with `has_pictures` also has a function `pictures(report, style)`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,9 +20,9 @@ class Format(NamedTuple):
     """A report format: the module in this package that writes it, and the endings of its file names.
 
     The usual ending is first. `about` is the description of the format in `--help`. The docstring of this module
-    explains `is_piecewise` and `has_pictures`. A file of a format with `is_binary` is no text. A format with
-    `is_illustrated` needs the mission and the images of verified limits. For other formats these are not kept in
-    memory.
+    explains `is_piecewise` and `has_pictures`. If `is_binary` is set, the files of the format are not text. If
+    `is_illustrated` is set, the writer needs the mission and the images of verified limits, which are not kept in
+    memory for other formats.
     """
 
     name: str
@@ -129,10 +129,10 @@ def content(format_name: str, report: "Report", style: Style) -> bytes:
 
 
 class Piece(NamedTuple):
-    """Text of one mission in a piecewise format.
+    """Text of one mission in a format that is written mission by mission.
 
-    `unusable` has the faults of an unusable file and is None for other files. `statuses` are the statuses of all rows
-    and requirements; `status` is the worst of them.
+    `unusable` holds the faults of the mission file if it is unusable, and is None otherwise. `statuses` are the
+    statuses of all rows and requirements; `status` is the worst of them.
     """
 
     status: str
@@ -142,7 +142,7 @@ class Piece(NamedTuple):
 
 
 def piece(mission: "MissionFindings | UnusableMission", format_name: str, style: Style) -> Piece:
-    """Write one mission in a piecewise format."""
+    """Write one mission in a format that is written mission by mission."""
     from bisar_budget.findings.mission import UnusableMission
 
     text: str = _module(format_name).piece(mission, style)

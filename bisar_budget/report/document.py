@@ -222,9 +222,9 @@ class TextTable:
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """A bar of the whole budget, divided into shares. Each share has an owner, a fraction and a text.
+    """A bar of the whole budget, divided into shares.
 
-    Markdown leaves the bar out.
+    Each share has an owner (a platform or the clock), a fraction and a text. Markdown leaves the bar out.
     """
 
     label: str

@@ -567,7 +567,7 @@ def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) 
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    """Scalar products of plane vectors (..., 2), (..., 1)."""
+    """Scalar products of plane vectors (..., 2); the result has the shape (..., 1)."""
     return a[..., :1] * b[..., :1] + a[..., 1:] * b[..., 1:]
 
 

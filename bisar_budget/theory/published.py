@@ -167,7 +167,10 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
 
 @cache
 def table_2() -> FormulaTable:
-    """Table II: quadratic phase error and largest allowable error, with the absolute-value bars missing in print."""
+    """Table II: quadratic phase error and largest allowable error.
+
+    The absolute-value bars, which are missing in print, are added.
+    """
     beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE_RAD
     rows = []
     for platform in PLATFORM_SYMBOLS:
@@ -295,17 +298,23 @@ def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
 
 
 def spatial_frequencies() -> Matrix:
-    """Return (8), (3,): −f/2 times the gradient of (6). [Hz]"""
+    """Spatial frequencies by equation (8), −f/2 times the gradient of (6); the result has the shape (3,). [Hz]"""
     return Matrix([f_i / 2 * expand(-diff(dr.far_field_in_angles(), x)) for x in point])
 
 
 def rotation(x: Expr, y: Expr) -> Matrix:
-    """Return (9) and (10), (2,): components along the look direction φ_b and 90° counter-clockwise from it."""
+    """Components of a vector along the look direction φ_b, and 90° counter-clockwise from it.
+
+    They follow from equations (9) and (10). The result has the shape (2,).
+    """
     return Matrix([x * cos(phi_b) + y * sin(phi_b), -x * sin(phi_b) + y * cos(phi_b)])
 
 
 def unrotated(x: Expr, y: Expr) -> Matrix:
-    """Components along x and y of a vector that is given in the rotated coordinates of (9) and (10), (2,)."""
+    """Components along x and y of a vector that is given in the rotated coordinates of equations (9) and (10).
+
+    The result has the shape (2,).
+    """
     return rotation(x, y).subs(phi_b, -phi_b)
 
 
@@ -374,7 +383,7 @@ def response() -> Expr:
 
 
 def general_matrix() -> Matrix:
-    """Return the matrix of (18), (2, 3), which maps a point in space to (β₀, β₁). [-], [1/s]"""
+    """Return the 2 × 3 matrix of equation (18), which maps a point in space to (β₀, β₁). [-], [1/s]"""
     return Matrix(dr.linear_differential_range()).jacobian(point)
 
 

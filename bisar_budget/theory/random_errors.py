@@ -95,7 +95,11 @@ _PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # pairs of orders of the field
 
 
 def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
-    """Moments from the mean squares of the coefficients of P₀ … P₃, and from the mean square of the full history."""
+    """Compute the moments of an error from the mean squares of its Legendre coefficients.
+
+    `coefficients` are the mean squares of the coefficients of P₀ … P₃. `mean_square` is the mean square of the whole
+    error, averaged over the aperture.
+    """
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
     return Moments(
         LEADING_RATIONALS[2] ** 2 * coefficients[2],

@@ -539,9 +539,9 @@ def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
     """Whether sums of displacements such as `actual` cannot be longer than sums of the expected displacements.
 
     If the signs of several displacements are chosen to maximise the length of their sum, this length is at least 2/π
-    times the sum of their lengths. A component across the expected direction is therefore harmless if the component
-    along this direction is shorter than expected by at least π/2 times as much. The result is False if the expected
-    displacement is zero.
+    times the sum of their lengths. A component across the expected direction is therefore harmless if it is at
+    most 2/π times the amount by which the component along this direction falls short of the expected length. The
+    result is False if the expected displacement is zero.
     """
     length = math.hypot(*expected)
     if not length:

@@ -806,7 +806,7 @@ class AddedIslr:
         return (self.high - self.low) / (2 * _INTERVAL_95_SIGMA)
 
     def verdict(self, required_db: float) -> str:
-        """Verdict on a limit at which the noise adds this ISLR, compared with the required ISLR.
+        """Verdict on a noise limit: compare the ISLR that noise at the limit adds with the required ISLR.
 
         The verdict is `not_evaluated` if more draws may change it. If even the maximum number of draws does not
         decide between `confirmed` and `conservative`, the verdict is `conservative`, because the noise does not add

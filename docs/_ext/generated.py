@@ -272,6 +272,8 @@ def _form(reader: readers.Reader) -> str:
         return ", ".join(f"`{name}`" for name in reader.names)
     if isinstance(reader, readers.TextList):
         return "list of texts"
+    if isinstance(reader, readers.Words) and isinstance(reader.word, readers.Text):
+        return "text, or a list of texts"
     if isinstance(reader, readers.Words):
         return "some of " + ", ".join(f"`{name}`" for name in reader.word.names)
     if isinstance(reader, readers.Whole):

@@ -82,15 +82,15 @@ def module_of(command: str) -> "ModuleType":
 
 
 def records_of(command: str, answers: Sequence[object]) -> Records:
-    """Return the table of an answer."""
+    """Return the answers of a command as a table of numbers and short strings."""
     records: Records = module_of(command).records(answers)
     return records
 
 
 def written(command: str, format_name: str, answers: Sequence[object], style: "Style") -> str | bytes:
-    """Write answers of a command, one for each mission, in one of its formats, without the drawings of Markdown.
+    """Format the answers of a command, one for each mission, as `format_name`, without the drawings of Markdown.
 
-    Texts end with a newline. A workbook is bytes.
+    Text ends with a newline. A workbook is returned as bytes.
 
     Raises
     ------
@@ -103,10 +103,10 @@ def written(command: str, format_name: str, answers: Sequence[object], style: "S
 def files(
     command: str, format_name: str, answers: Sequence[object], style: "Style", path: str
 ) -> dict[str, str | bytes]:
-    """Write answers of a command to be stored in the file `path`.
+    """Format the answers of a command as the contents of files, by path; nothing is written to disk.
 
-    Returns the content of each file by its path: the drawings of Markdown, which are in a folder beside the file, and
-    the file itself at the end. If `path` is empty, there are no drawings. Errors are those of `written`.
+    The drawings of Markdown come first, in a folder beside `path`, and the file `path` itself is last. If `path` is
+    empty, there are no drawings. Raises the same errors as `written`.
     """
     module = module_of(command)
     if format_name in ANSWERS[command].own_formats:

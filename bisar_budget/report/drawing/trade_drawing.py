@@ -59,12 +59,12 @@ def trade_drawing(
     above: Sequence[str] = (),
     seen_from_above: BistaticGeometry | None = None,
 ) -> str:
-    """Draw a sweep over one key or two as SVG.
+    """Draw a sweep over one or two keys as SVG.
 
     Parameters
     ----------
     trade : Trade
-        Sweep over one key or two. The first axis of a polar map is the azimuth.
+        Sweep over one or two keys. The first axis of a polar map is the azimuth.
     rows : Mapping[str, ndarray]
         Utilizations (cases,) of each row that is the worst row in at least one case, if only one key varies. [-]
     key : str
@@ -72,7 +72,8 @@ def trade_drawing(
     title, description : str
         Title of the drawing, and a description for readers who cannot see it.
     above : Sequence[str]
-        Lines above a drawing in a separate file. The first line is the name.
+        Lines of text to print above the drawing if it is stored in a file of its own. The first line is the name of
+        the mission.
     seen_from_above : BistaticGeometry, optional
         Geometry for a polar map, which shows the direction of the platform that does not vary.
     """
@@ -89,9 +90,10 @@ def trade_drawing(
 
 
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
-    """Lines above a drawing in a separate file: mission, fixed values, changes by options, and gating model.
+    """Lines of text to print above a drawing that is stored in a file of its own.
 
-    For a polar map, two last lines name its angle and radius, in words and by their keys.
+    They give the name of the mission, the fixed values, the changes by options, and the gating model. For a polar
+    map, the last two lines name its angle and radius, in words and by their keys.
     """
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"

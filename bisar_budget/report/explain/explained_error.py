@@ -355,7 +355,7 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
 
 
 def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the steps for an error along an axis of a frame other than the scene.
+    """Yield the explanation steps for an error along an axis of a frame other than the scene.
 
     Its effect is the sum of the effects along the axes of the scene, projected on this axis.
     """

@@ -91,7 +91,7 @@ _PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "re
 
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
-    """Yield the steps that explain a random error, from its line in the mission file to its allowable."""
+    """Yield the explanation steps for a random error, from its line in the mission file to its allowable."""
     mission, model = analysis.mission, row.model or "published"
     yield from _declared(mission, error, row)
     yield from error.subject.facts.find_in(RANDOM_STEPS, error.subject.axis)(analysis, error)
@@ -177,7 +177,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for a tilt error that also moves the antenna, because the platform has a lever arm."""
+    """Yield the explanation steps for a tilt error that also moves the antenna by means of a lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or not INERTIAL_FIGURES[error.subject.axis].tilts:
         return
@@ -328,7 +328,7 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the steps for a zenith delay that changes within the aperture as a random process.
+    """Yield the explanation steps for a zenith delay that changes within the aperture as a random process.
 
     If the delay is constant over the aperture, there are no steps.
     """
@@ -521,7 +521,7 @@ def _link(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
-    """Yield the steps with the points of a spectrum of acceleration or displacement, and with its shift in level."""
+    """Yield the explanation steps for the points and level shift of a spectrum of acceleration or displacement."""
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
     scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]

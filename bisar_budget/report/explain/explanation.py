@@ -136,7 +136,7 @@ def _fitted(line: str) -> list[str]:
 
 
 def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps of the explanation of a row.
+    """Yield the explanation steps for a row.
 
     They lead from the line in the mission file to the utilization, or to the reason why the row has no utilization.
     """
@@ -421,7 +421,7 @@ def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
-    """Yield the steps that convert the amplitudes of a spectral line from an acceleration to metres."""
+    """Yield the explanation steps that convert the amplitudes of a spectral line from an acceleration to metres."""
     line = getattr(mission.platforms, platform).motion_error.vibration.sinusoidal[entry]
     if not isinstance(line, AcceleratedSinusoid):
         return
@@ -534,7 +534,10 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the combined quadratic phase of all errors of one owner, and for its limit."""
+    """Yield the explanation steps for the combined quadratic phase of all errors of one owner, such as the receiver.
+
+    Further steps explain the limit of this phase.
+    """
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
     rule, gain = findings.combine, allocation.autofocus_gain
@@ -724,7 +727,7 @@ def _asked_for(mission: Mission) -> Iterator[Step]:
 
 
 def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the steps that explain why a row could not be judged.
+    """Yield the explanation steps for a row that could not be judged.
 
     The reason is an effect without a requirement, a platform path that may be wrong, or an unknown displacement.
     """

@@ -83,7 +83,7 @@ _UidName = tuple[str, ...]  # an id of the project, or the name of a finding as 
 
 @dataclass
 class _Required:
-    """A requirement of the document; several missions, requirements and rows may share it."""
+    """A requirement node of the document. Several missions, mission requirements and rows may share a node."""
 
     titles: list[str] = field(default_factory=list)
     statements: list[str] = field(default_factory=list)

@@ -249,10 +249,10 @@ def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
 
 
 def _limited_by(row: Row) -> str:
-    """Text about the limit of a row for a table column.
+    """Short text for the table column that names the limit of each row.
 
-    It names the requirement that sets the allowable, or the equation of the limit if this requirement is on the
-    metric in which the row itself is stated.
+    Usually this is the requirement that sets the allowable. If that requirement is on the row's own metric, it is the
+    equation of the limit instead.
     """
     binding = binding_words(row)
     if binding:
