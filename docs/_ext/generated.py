@@ -129,6 +129,13 @@ def _documents() -> list[dict[str, Any]]:
     checked = (
         ("specs/missions/one_stationary_spotlight.yaml", "--verify"),
         ("specs/missions/drones_same_gnss.yaml", "--monte-carlo", "1000"),
+        (
+            "specs/missions/tandem_x.yaml",
+            "--set",
+            "requirement_ids.receiver.velocity.x=SYS-1",
+            "--set",
+            "requirement_texts.SYS-1=The image is sharp.",
+        ),
         ("specs/missions/gps_aircraft_direct_path.yaml",),
         ("specs/missions/sentinel1_aircraft_log.yaml",),
         ("no such file.yaml",),
@@ -142,7 +149,7 @@ def _documents() -> list[dict[str, Any]]:
 
 
 # Mappings whose keys are names of the mission, not of the contract.
-_NAMED = ("summary",)
+_NAMED = ("summary", "requirement_texts")
 
 
 def _leaves(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
