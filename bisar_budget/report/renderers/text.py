@@ -6,7 +6,8 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
-from bisar_budget.report.words.sentences import TEXT_WIDTH, spaced, wrapped
+from bisar_budget.report.words.heading import wrapped_overrides
+from bisar_budget.report.words.sentences import spaced, wrapped
 
 _MIN_NAME_WIDTH = 12  # of the names of facts
 _STATUS_WIDTH = 8  # characters of a status, the same in every table
@@ -107,13 +108,7 @@ def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
     terms = f"; {opening.terms}" if opening.terms else ""
     for words in (*opening.more, f"{opening.file}, {opening.name}{terms}"):
         yield from wrapped(plain(words), "  ")
-    line = f"Overrides: {'; '.join(opening.overrides)}"
-    if len(line) <= TEXT_WIDTH or len(opening.overrides) < 2:
-        yield from wrapped(line, "  ") if opening.overrides else []
-        return
-    yield "Overrides:"
-    for override in opening.overrides:
-        yield from wrapped(f"  {override}", "    ")
+    yield from wrapped_overrides(opening.overrides)
 
 
 def _table(table: doc.TextTable, style: Style) -> Iterator[str]:

@@ -12,7 +12,6 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
-from bisar_budget.report import Style
 from bisar_budget.report.words.sentences import TEXT_WIDTH, phase_limit, sentence, wrapped
 from bisar_budget.units import format_quantity
 
@@ -74,11 +73,12 @@ def other_overrides(mission: AboutMission) -> list[str]:
 
 
 def overrides_lines(mission: AboutMission) -> list[str]:
-    """Lines for a terminal with the overrides, except for `--set`.
+    """Lines with the overrides other than `--set`, for a terminal."""
+    return wrapped_overrides(other_overrides(mission))
 
-    They are on a single line if they fit, otherwise each is on its own line.
-    """
-    overrides = _overrides(mission, with_changes=False)
+
+def wrapped_overrides(overrides: Sequence[str]) -> list[str]:
+    """Lines with overrides: all on one line, or each on its own line if they do not fit."""
     line = f"Overrides: {'; '.join(overrides)}"
     if len(line) <= TEXT_WIDTH or len(overrides) < 2:
         return wrapped(line, "  ") if overrides else []
@@ -90,19 +90,6 @@ def file_words(mission: AboutMission) -> str:
     return (
         f"{printable(mission.file)} {changes_words(mission.changes)}" if mission.changes else printable(mission.file)
     )
-
-
-def title_lines(
-    mission: AboutMission, verdict: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
-) -> Iterator[str]:
-    """Yield the lines above an answer: coloured verdict, then `more`, file and name of the mission, overrides."""
-    first, *continuation = wrapped(verdict, "  ")
-    yield style.coloured(first, sgr)
-    yield from continuation
-    for text in (*more, f"{file_words(mission)}, {printable(mission.name)}{remark}"):
-        yield from wrapped(text, "  ")
-    yield from overrides_lines(mission)
-    yield ""
 
 
 def document_words(document: Document) -> str:
