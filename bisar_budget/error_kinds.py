@@ -329,6 +329,7 @@ for _kind in (
         spectrum_axis="spectrum",
     ),
     SourceKind(name="imu", moves="platform", drawn_as="motion", is_random=True, is_largest_of_axes=True),
+    SourceKind(name="navigation", moves="platform", drawn_as="motion", is_random=True, is_computed=True),
     SourceKind(name="lever_arm", moves="platform", drawn_as="motion", is_random=True),
     SourceKind(
         name="random",

@@ -46,6 +46,8 @@ def swings_nothing(platform: Platform) -> bool:
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
     if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
+    if platform.motion_error.navigation is not None:
+        return False
     return imu is None or all(
         getattr(imu, figure.name) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
     )
@@ -98,6 +100,7 @@ class _OfPlatform:
     If `is_owed` is not set, the kind counts as missing only if the file states a part of it. For a platform that does
     not move, only the kinds with `is_owed_still` are required. A kind without `is_listed` counts as other kinds, for
     example a covariance as position and velocity. Kinds with `is_clock` are not needed if there is a direct path.
+    Kinds with `is_in_navigation` are part of an aided navigation, which declares them.
     """
 
     key: str
@@ -109,6 +112,7 @@ class _OfPlatform:
     is_owed_still: bool = False
     is_listed: bool = True
     is_clock: bool = False
+    is_in_navigation: bool = False
 
 
 def _is_sourced(figure: str) -> Callable[[Platform], bool]:
@@ -129,6 +133,11 @@ def _has_source_of_imu(platform: Platform) -> bool:
 def _has_source_of_random(platform: Platform) -> bool:
     error = platform.motion_error
     return bool(error.evidence("random")) or all(process.source for process in error.random)
+
+
+def _has_source_of_navigation(platform: Platform) -> bool:
+    navigation = platform.motion_error.navigation
+    return navigation is not None and all(map(navigation.evidence, navigation.figures))
 
 
 def _has_source_of_lever_arm(platform: Platform) -> bool:
@@ -164,11 +173,24 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
     ),
     "imu": _OfPlatform(
         "motion_error.imu",
-        lambda platform: platform.motion_error.imu is not None and platform.motion_error.imu.is_stated,
+        lambda platform: (
+            platform.motion_error.navigation is not None
+            or (platform.motion_error.imu is not None and platform.motion_error.imu.is_stated)
+        ),
         _has_source_of_imu,
+        is_in_navigation=True,
     ),
     "random": _OfPlatform(
-        "motion_error.random", lambda platform: bool(platform.motion_error.random), _has_source_of_random
+        "motion_error.random",
+        lambda platform: bool(platform.motion_error.random) or platform.motion_error.navigation is not None,
+        _has_source_of_random,
+        is_in_navigation=True,
+    ),
+    "navigation": _OfPlatform(
+        "motion_error.navigation",
+        lambda platform: platform.motion_error.navigation is not None,
+        _has_source_of_navigation,
+        is_owed=False,
     ),
     "oscillator": _OfPlatform(
         "oscillator",
@@ -333,6 +355,8 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
         for kind, of_platform in _of_platforms().items():
             if not of_platform.is_listed or (of_platform.is_clock and mission.has_direct_path):
                 continue
+            if of_platform.is_in_navigation and platform.motion_error.navigation is not None:
+                continue
             is_stated = of_platform.is_stated(platform)
             if is_stated and not (of_platform.needs_both and of_platform.lacks(mission, name)):
                 declared.append(f"{name}.{kind}")
@@ -358,6 +382,9 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration
         source, levels = platform.motion_error.source, list[tuple[str, str, float | None, str | None]]()
         levels.append(("vibration", "motion_error.vibration.spectrum_level", vibration.spectrum_level, source))
+        if platform.motion_error.navigation is not None:
+            navigation = platform.motion_error.navigation
+            levels.append(("navigation", "motion_error.navigation.level", navigation.level, navigation.source))
         if oscillator is not None:
             felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
             levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))

@@ -47,10 +47,11 @@ from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import POOR_FIT_FRACTION
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import NavigationState, Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import OSCILLATOR_NOISE_FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.navigation import Navigation
 from bisar_budget.mission.platforms import FlownPath, MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
@@ -59,6 +60,7 @@ from bisar_budget.phrases import NOTHING, Note
 ISLR = "islr"
 RANDOM_REQUIREMENTS = (QUADRATIC, CUBIC, ISLR, LOCATION)  # in the order of the fields of `Limits`
 _GOOD_FIT_FRACTION = 0.005  # largest misfit of a power law to an Allan deviation that needs no remark
+_CONVERGED_FRACTION = 0.3  # of an error at the start; with more at mid-aperture, a navigation rests on its start
 
 
 class Limits(NamedTuple):
@@ -371,6 +373,7 @@ class RandomRow(FamilyRow):
             remarks=notes,
             binding_requirement=binding,
             displacement_m=_displacement(error, gating),
+            navigation=error.navigation and NavigationState(*error.navigation.at_middle),
         )
 
 
@@ -499,6 +502,35 @@ def _log_wording(mission: Mission, error: RandomError) -> _Wording:
     return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(error.subject.axis),)
 
 
+def _navigation_wording(mission: Mission, error: RandomError) -> _Wording:
+    navigation = getattr(mission.platforms, error.owner).motion_error.navigation
+    return (
+        "aided navigation",
+        "; ".join(navigation.sources) or None,
+        tuple(_navigation_notes(mission, error, navigation)),
+    )
+
+
+def _navigation_notes(mission: Mission, error: RandomError, navigation: Navigation) -> Iterator[Note]:
+    """Yield notes on the assumptions behind the covariance of an aided navigation."""
+    half, errors = mission.collection.aperture_time / 2, error.navigation
+    if navigation.is_smoothed:
+        yield phrases.note("navigation-is-smoothed", before=navigation.before, after=navigation.after_s)
+    else:
+        yield phrases.note("navigation-is-filtered", before=navigation.before)
+    if navigation.gnss.correlation_time is None:
+        yield phrases.note("gnss-errors-are-white")
+    if navigation.level:
+        yield phrases.note("navigation-is-shifted", level_db=navigation.level)
+    if errors is not None and not errors.has_fixes:
+        yield phrases.note("navigation-has-no-fix", start=-half - navigation.before, end=half + navigation.after_s)
+    elif errors is not None:
+        share, quantity = errors.remaining_start
+        if share > _CONVERGED_FRACTION:
+            yield phrases.note("navigation-has-not-converged", share=share, quantity=quantity)
+    yield from override_notes(error.owner, navigation.overridden)
+
+
 def _process_wording(mission: Mission, error: RandomError) -> _Wording:
     source = process_of(mission, error).source
     if error.owner not in PLATFORMS:
@@ -623,6 +655,7 @@ RANDOM_WORDINGS: Mapping[str, Callable[[Mission, RandomError], _Wording]] = {
     "imu": _sensor_wording,
     "lever_arm": partial(_sensor_wording, equation="lever arm"),
     "lever_arm.uncertainty": _uncertainty_wording,
+    "navigation": _navigation_wording,
     "random": _process_wording,
     "trajectory": _log_wording,
     "oscillator": _oscillator_wording,
@@ -635,6 +668,7 @@ REASONS_FOR_NO_EFFECT: Mapping[str, Callable[[Mission, RandomError], Note]] = {
     "vibration": _across,
     "imu": _across,
     "lever_arm": _across,
+    "navigation": _across,
     "random": _across,
     "trajectory": _across,
     "oscillator": _quiet,

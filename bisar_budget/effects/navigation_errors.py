@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.arrays import Floats, PerCase, PerCaseFlag
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
     Moves,
@@ -313,9 +313,18 @@ def body_axes(state: PlatformState, times: Floats) -> Floats:
 
     The axes are along, cross and up of the velocity. For a platform at rest they are the axes of the scene.
     """
-    u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
-    if np.any(state.is_still):
-        u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
+    velocity = np.array([np.broadcast_to(component, times.shape) for component in state.at(times)[1]])
+    return body_axes_of(velocity, state.is_still)
+
+
+def body_axes_of(velocity: Floats, is_still: PerCaseFlag) -> Floats:
+    """Body axes at velocities (3, ...) [m/s], as unit vectors in the axes of the scene, (axes, 3, ...).
+
+    `is_still` marks the cases of a platform at rest.
+    """
+    u, v, w = velocity
+    if np.any(is_still):
+        u, v, w = (np.where(is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
         along = without_rounding(unit((u, v, w)))
         leftward = without_rounding(unit((-v, u, 0.0 * w)))
@@ -343,6 +352,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield the errors of a platform's lever arm; no errors if the file states no lever arm.
 
     They are the effect of attitude errors through the arm, declared or not, and the declared uncertainty of the arm.
+    The row of an aided navigation includes the effect of its attitude errors through the arm.
     """
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm
@@ -350,7 +360,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         return
     platform_index, state, times = PLATFORMS.index(name), getattr(seen.geometry, name), seen.exact.times
     key = ("platforms", name, "motion_error")
-    if lever.arm is not None:
+    if lever.arm is not None and error.navigation is None:  # which includes the swing of the arm
         declared, axes = None, seen.axes(name)
         attitude = None if error.imu is None else error.imu.attitude
         if attitude is not None:

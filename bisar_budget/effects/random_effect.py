@@ -38,6 +38,7 @@ from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
 
 if TYPE_CHECKING:
+    from bisar_budget.effects.aided_navigation import NavigationErrors
     from bisar_budget.effects.oscillators import Noise
 
 # Numbers of nodes at which random errors are sampled. Fewer nodes distinguish too few orders of a process. More nodes
@@ -143,7 +144,8 @@ class RandomError(NamedTuple):
     several axes it is the largest size of all axes, and the sizes of all axes are proportional to it. The unit of an
     oscillator's error is `dB`, and its noise is declared as an amplitude factor of 1. `noise` is the spectrum of an
     oscillator; it is None if the numbers are arrays over cases, and for errors of any other kind. `noise_in_case`
-    computes the spectrum from the mission of one case and the name of the platform. `spreads` is true for noise, and
+    computes the spectrum from the mission of one case and the name of the platform. `navigation` is the covariance of
+    an aided navigation, and None for errors of any other kind. `spreads` is true for noise, and
     false for an error whose variation over the aperture has only a few orders.
 
     `counted_in` is the id of another row that already includes the effect of this error. This error is then left out
@@ -166,6 +168,7 @@ class RandomError(NamedTuple):
     continued: RandomEffect | None = None
     is_in_doubt: PerCaseFlag = False
     noise_in_case: "Callable[[Mission, str], Noise] | None" = None
+    navigation: "NavigationErrors | None" = None
 
     @property
     def id(self) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.air_delays import delay_errors
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.navigation_errors import (
@@ -46,6 +47,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
     errors += [error for name in PLATFORMS for error in inertial_errors(seen, name)]
+    errors += [error for name in PLATFORMS for error in aided_navigation(seen, name)]
     errors += [error for name in PLATFORMS for error in lever_arm_errors(seen, name)]
     errors += [error for name in PLATFORMS for error in position_noise(seen, name)]
     errors += [error for name in PLATFORMS for error in log_noise(seen, name)]
@@ -79,7 +81,12 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
     noise = None if error.noise_in_case is None else error.noise_in_case(mission, error.owner)
     declared = None if error.declared is None else plain(error.declared, case)
     continued = None if error.continued is None else error.continued.of(case)
-    is_in_doubt = bool(plain(error.is_in_doubt, case))
     return error._replace(
-        declared=declared, published=published, full=full, noise=noise, continued=continued, is_in_doubt=is_in_doubt
+        declared=declared,
+        published=published,
+        full=full,
+        noise=noise,
+        continued=continued,
+        is_in_doubt=bool(plain(error.is_in_doubt, case)),
+        navigation=error.navigation and error.navigation.of(case),
     )

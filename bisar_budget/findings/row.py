@@ -49,6 +49,20 @@ def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaive
     return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
 
+class NavigationState(NamedTuple):
+    """Errors of an aided navigation at mid-aperture: roots of the sums of the variances of all axes.
+
+    `tilt_rms_rad` is the error of roll and pitch.
+    """
+
+    position_rms_m: float
+    velocity_rms_mps: float
+    tilt_rms_rad: float
+    heading_rms_rad: float
+    gyro_bias_rms_radps: float
+    accelerometer_bias_rms_mps2: float
+
+
 class Row(NamedTuple):
     """One row of the budget.
 
@@ -62,8 +76,8 @@ class Row(NamedTuple):
     `qpe_full_rad` and the hidden phase together; the hidden phase is the part that the bandwidth and the turn of the
     line of sight do not resolve. `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the
     model that gives these numbers. `waivers` are the waivers, valid or expired, that name the row while it fails.
-    `refuted` names the images that refute the limit of the row. `requirement_ids` are the ids that the project gives
-    to the row.
+    `refuted` names the images that refute the limit of the row. `navigation` has the errors at mid-aperture if the
+    row is that of an aided navigation. `requirement_ids` are the ids that the project gives to the row.
     """
 
     subject: Subject
@@ -96,6 +110,7 @@ class Row(NamedTuple):
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()
+    navigation: NavigationState | None = None
     is_unjudged: bool = False  # the row cannot be judged, waived or not
 
     def __repr__(self) -> str:

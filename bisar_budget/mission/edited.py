@@ -79,14 +79,9 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Yield the key and the file name of each part that a mission names by its file, not by its catalogue name."""
     for owner, platform in mission.platforms._asdict().items():
-        sensor = platform.motion_error.sensor
-        key = f"platforms.{owner}.motion_error.sensor"
-        name_by_key = (
-            {key: sensor} if isinstance(sensor, str) else {f"{key}.{n}": name for n, name in enumerate(sensor or ())}
-        )
-        if platform.oscillator is not None and platform.oscillator.sensor is not None:
-            name_by_key[f"platforms.{owner}.oscillator.sensor"] = platform.oscillator.sensor
-        yield from ((key, name) for key, name in name_by_key.items() if is_file(name))
+        for key, name in platform.parts.items():
+            if is_file(name):
+                yield f"platforms.{owner}.{key}", name
 
 
 def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:

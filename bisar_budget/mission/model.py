@@ -235,7 +235,7 @@ OTHER_EFFECTS = ("quadratic_phase_error", "cubic_phase_error", "location_error",
 # Kinds of error that each platform has, and those of the mission as a whole.
 OF_PLATFORMS = (
     *("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator"),
-    *("time_tag", "lever_arm"),
+    *("navigation", "time_tag", "lever_arm"),
 )
 OF_MISSION = ("timing", "synchronization", "propagation", "common", "other", "terrain")
 DECLARABLE = (*OF_PLATFORMS, *OF_MISSION)
@@ -693,6 +693,7 @@ def has_instruments(mission: Mission) -> bool:
             platform.oscillator is not None
             or platform.motion_error.imu is not None
             or platform.motion_error.random
+            or platform.motion_error.navigation is not None
             or platform.motion_error.lever_arm is not None
             or platform.motion_error.vibration.spectrum is not None
             or (platform.path is not None and platform.path.is_raw)
@@ -730,10 +731,7 @@ def flies_on_earth(mission: Mission) -> bool:
 
 def names_parts(mission: Mission) -> bool:
     """Whether a mission takes figures from parts of the catalogue."""
-    return any(
-        platform.motion_error.sensor or (platform.oscillator is not None and platform.oscillator.sensor)
-        for platform in mission.platforms
-    )
+    return any(platform.parts for platform in mission.platforms)
 
 
 def names_requirements(root: Mapping[str, object]) -> bool:
@@ -747,7 +745,7 @@ def names_files(root: Mapping[str, object]) -> bool:
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return names_requirements(root) or any(
-        key in ("orbit", "trajectory") or (isinstance(item, dict) and "sensor" in item)
+        key in ("orbit", "trajectory") or (isinstance(item, dict) and ("sensor" in item or "navigation" in item))
         for section in sections
         if isinstance(section, dict)
         for key, item in section.items()

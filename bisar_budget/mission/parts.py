@@ -48,6 +48,14 @@ from bisar_budget.mission.instruments import (
     VelocityRandomWalk,
 )
 from bisar_budget.mission.model import DRAFT, Mission
+from bisar_budget.mission.navigation import (
+    AIDED_GNSS_FIGURES,
+    AIDED_IMU_FIGURES,
+    AidedGnss,
+    AidedImu,
+    Navigation,
+    missing_figures,
+)
 from bisar_budget.mission.platforms import MotionError, Platforms
 from bisar_budget.mission.readers import (
     COORDINATE,
@@ -555,6 +563,11 @@ def _with_sensors(
     Figures that come from parts are appended to `taken`. If the file states a figure that a part also states, the
     figure of the file is kept, and the motion error lists the part's figure as overridden.
     """
+    if error.navigation is not None:
+        navigation = _with_aiding_parts(error.navigation, (*path, "navigation"), find, report, taken)
+        if navigation is INVALID:
+            return INVALID
+        error = error._replace(navigation=navigation)
     path = (*path, "sensor")
     entries = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
     if entries is INVALID:
@@ -586,6 +599,44 @@ def _with_sensors(
         section = (*path[:-1], "imu") if isinstance(part, ImuPart) else path[:-1]
         taken += _taken(name, entry, section, figures)
     return error._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+
+
+def _with_aiding_parts(
+    navigation: Navigation, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
+) -> Navigation | Invalid:
+    """Complete an aided navigation with the figures of the parts that it names; `INVALID` if a problem is reported.
+
+    Figures that come from parts are appended to `taken`. A figure that the file states replaces that of a part.
+    """
+    overridden, of_parts, is_valid = [], dict[str, str](), True
+    sections: dict[str, AidedImu | AidedGnss] = {"imu": navigation.imu, "gnss": navigation.gnss}
+    figures_of_kind = {"imu": AIDED_IMU_FIGURES, "gnss": AIDED_GNSS_FIGURES}
+    for kind, section in sections.items():
+        entries = _parts_of(section.sensor, (*path, kind, "sensor"), (kind,), find, report)
+        if entries is INVALID:
+            is_valid = False
+            continue
+        for name, entry in entries.items():
+            figures = {}
+            for figure, text in entry.figures.items():
+                if figure not in figures_of_kind[kind]:
+                    continue
+                if getattr(section, figure) is None:
+                    figures[figure] = getattr(entry.part, figure)
+                else:
+                    key = f"motion_error.navigation.{kind}.{figure}"
+                    overridden.append(Overridden(f"{kind}.{figure}", key, entry.part.name, text))
+            sections[kind] = section._replace(sensor=None, **figures)
+            of_parts |= {f"{kind}.{figure}": evidence(entry.part, figure) for figure in figures}
+            taken += _taken(name, entry, (*path, kind), figures)
+            for problem in missing_figures(**{"imu": None, "gnss": None, kind: sections[kind]}):
+                words = f"{problem.problem}: {shown(entry.part.name)} states none"
+                report(path, problem._replace(problem=words))
+                is_valid = False
+            sections[kind] = sections[kind]._replace(sensor=name)
+    if not is_valid:
+        return INVALID
+    return navigation._replace(**sections, of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:

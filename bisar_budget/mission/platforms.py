@@ -38,6 +38,7 @@ from bisar_budget.mission.instruments import (
     Oscillator,
     Overridden,
 )
+from bisar_budget.mission.navigation import NAVIGATION, Navigation
 from bisar_budget.mission.readers import (
     ACCELERATION_COMPONENT,
     COORDINATE,
@@ -93,6 +94,8 @@ TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # Copies of `paths.path_formats`, whose import would load all readers in every check.
 SMOOTHED, RAW = "smoothed", "raw"  # path that a processor uses: the log smoothed, or its raw fixes
 _LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
+# Keys of a motion error that describe what `navigation` computes.
+_REPLACED_BY_NAVIGATION = ("imu", "covariance", "random", "sensor")
 PART_REFERENCES = either(list, TextList(), Reference())
 
 
@@ -138,6 +141,13 @@ class MotionError(NamedTuple):
         tuple[GaussMarkov, ...],
         Key(RANDOM, "Position errors that change within the aperture."),
     ] = ()
+    navigation: Annotated[
+        Navigation | None,
+        Key(
+            NAVIGATION,
+            "An inertial unit that a GNSS receiver aids, in place of imu, covariance, random and sensor.",
+        ),
+    ] = None
     time_tag: Annotated[
         float | None,
         Key(TIME_TAG, "Time error of the navigation against the radar; positive: positions belong to later times."),
@@ -160,6 +170,10 @@ class MotionError(NamedTuple):
         The names of the errors in `random` have to be distinct.
         """
         yield from _names_twice(values.get("random", ()))
+        if values.get("navigation") is not None:
+            for key in _REPLACED_BY_NAVIGATION:
+                if values.get(key):
+                    yield Problem("stands beside navigation, which replaces it", "accepted: one of both", at=(key,))
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
@@ -608,6 +622,19 @@ class Platform(NamedTuple):
                 state.frame(error.frame)
             except UndefinedFrameError as undefined:
                 yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
+
+    @property
+    def parts(self) -> dict[str, str]:
+        """Map each key below the platform that names a part of the catalogue to the name of the part."""
+        names = {"motion_error.sensor": self.motion_error.sensor}
+        if isinstance(self.motion_error.sensor, tuple):
+            names = {f"motion_error.sensor.{n}": name for n, name in enumerate(self.motion_error.sensor)}
+        if self.motion_error.navigation is not None:
+            names["motion_error.navigation.imu.sensor"] = self.motion_error.navigation.imu.sensor
+            names["motion_error.navigation.gnss.sensor"] = self.motion_error.navigation.gnss.sensor
+        if self.oscillator is not None:
+            names["oscillator.sensor"] = self.oscillator.sensor
+        return {key: name for key, name in names.items() if isinstance(name, str)}
 
     @property
     def way(self) -> str:

@@ -39,6 +39,7 @@ from bisar_budget.phrases.limit_sentences import (
     published_model_does_not_hold,
     quadratic_phase_over,
 )
+from bisar_budget.phrases.navigation_sentences import NAVIGATION_SENTENCES
 from bisar_budget.phrases.no_limit_sentences import NO_LIMIT_SENTENCES
 from bisar_budget.phrases.notes import COMPOSED, NOTHING, Note
 from bisar_budget.phrases.oscillator_sentences import OSCILLATOR_SENTENCES
@@ -126,6 +127,7 @@ SENTENCE_TABLES = (
     IMAGE_SENTENCES,
     INPUT_SENTENCES,
     LIMIT_SENTENCES,
+    NAVIGATION_SENTENCES,
     NO_LIMIT_SENTENCES,
     OSCILLATOR_SENTENCES,
     REQUIREMENT_SENTENCES,

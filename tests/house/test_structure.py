@@ -34,7 +34,7 @@ FLOORS = [
     {"error_kinds"},
     {"image_plane"},
     {"theory", "evaluators", "catalogue"},
-    {"paths"},
+    {"paths", "navigation"},
     {"mission"},
     {"ranges"},
     {"effects"},

@@ -303,6 +303,4 @@ def _sensors(mission: Mission, row: Row) -> set[str]:
     if row.owner not in PLATFORMS:
         return set()
     platform: Platform = getattr(mission.platforms, row.owner)
-    named = [platform.motion_error.sensor, platform.oscillator and platform.oscillator.sensor]
-    listed = [name for entry in named if entry for name in ((entry,) if isinstance(entry, str) else entry)]
-    return {plain_file(name) for name in listed}
+    return {plain_file(name) for name in platform.parts.values()}

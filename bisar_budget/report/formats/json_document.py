@@ -228,7 +228,7 @@ def _row(row: Row) -> dict[str, object]:
         "note_codes": [note.code for note in notes],
         "requirement_ids": row.requirement_ids,
     }
-    return item
+    return item if row.navigation is None else item | {"navigation": row.navigation._asdict()}
 
 
 def monte_carlo_item(drawn: MonteCarlo) -> dict[str, object]:

@@ -1,0 +1,318 @@
+"""Random position error of a platform whose inertial unit is aided by GNSS, and its effect on the image.
+
+The position errors of such a navigation at two moments are correlated, and the correlation decides what the image
+shows: a constant error displaces the image, and only the change of the error over the aperture defocuses it. The
+joint covariance over the aperture comes from `navigation.smoother`. It is projected on the turning line of sight
+here.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bisar_budget.arrays import Booleans, Floats, PerCase
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
+from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.navigation_errors import body_axes_of
+from bisar_budget.effects.random_effect import Moves, RandomEffect, RandomError, SensorCases, factor
+from bisar_budget.geometry import PlatformState
+from bisar_budget.image_plane import LEGENDRE_LEADING
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, Navigation
+from bisar_budget.navigation.error_state import (
+    ACCELEROMETER_BIAS,
+    GYRO_BIAS,
+    HEADING,
+    LEVEL_TILT,
+    POSITION,
+    VELOCITY,
+    Fixes,
+    InertialUnit,
+)
+from bisar_budget.navigation.smoother import AidedCovariance, Flight, StartSigmas, aided_covariance
+from bisar_budget.navigation.timeline import FixSchedule, Timeline, timeline_of
+from bisar_budget.paths.earth import free_fall
+
+_TURNING_STEP_S = 0.1  # within which attitude and specific force may be taken as constant
+_STRAIGHT_STEP_S = 1.0
+_WHITE_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
+MOST_ORDERS = 24  # Legendre orders of the position error; higher ones only spread power
+
+
+@dataclass(frozen=True, kw_only=True)
+class NavigationErrors:
+    """Joint covariance of the position error of an aided navigation, and the errors of its state at mid-aperture.
+
+    Attributes
+    ----------
+    covariance : AidedCovariance
+        Joint covariance of the position error over the aperture, in each case, without `level`.
+    """
+
+    covariance: AidedCovariance
+
+    def of(self, case: int) -> "NavigationErrors":
+        """Errors in one case, by its index."""
+        return NavigationErrors(covariance=self.covariance.at(np.array([case])))
+
+    @property
+    def has_fixes(self) -> bool:
+        """Whether the flight has a fix, in the only case."""
+        return bool(self.covariance.fix_count[0])
+
+    @property
+    def at_middle(self) -> tuple[float, ...]:
+        """Errors at mid-aperture in the only case, in the order of `findings.row.NavigationState`."""
+        states = (POSITION, VELOCITY, LEVEL_TILT, HEADING, GYRO_BIAS, ACCELEROMETER_BIAS)
+        return tuple(float(self.covariance.rms(state)[0]) for state in states)
+
+    @property
+    def remaining_start(self) -> tuple[float, str]:
+        """Largest ratio of an error at mid-aperture to the same error at the start, and the name of this error.
+
+        The heading is left out: a straight flight does not reveal it, and it has no effect there.
+        """
+        start = StartSigmas(heading_rad=np.zeros(1))
+        _, velocity, tilt, *_ = self.at_middle
+        ratios = {"velocity": velocity / (3**0.5 * start.velocity_mps), "tilt": tilt / (2**0.5 * start.tilt_rad)}
+        return max((ratio, name) for name, ratio in ratios.items())
+
+
+def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Yield the error of a platform's aided navigation; no error if the file states none.
+
+    Its unit is dB: the declared size is the covariance of the file, and its allowable a factor on this covariance.
+    """
+    error = seen.error(name)
+    navigation = error.navigation
+    if navigation is None:
+        return
+    count, errors = len(seen.exact.times), navigation_errors(seen, name)
+    covariance = errors.covariance
+    amplitude = 10 ** (np.asarray(navigation.level) / 20)
+    platform_index, places = PLATFORMS.index(name), seen.exact.sampling.places
+    axes = np.eye(3)[:, :, None, None] * np.ones((1, 1, count, seen.cases))
+    along = seen.range_errors(platform_index, axes)  # range error per metre east, north and up, (3, nodes, cases)
+    at_nodes = np.polynomial.legendre.legvander(places, covariance.order_count - 1)
+    effects = (
+        _published(seen, platform_index, covariance),
+        _in_full_model(seen, covariance, along, at_nodes),
+    )
+    published, full = (_times(effect, amplitude) for effect in effects)
+    moves = ()
+    if seen.has_edge:
+        ways = np.einsum("no,aokc->kanc", at_nodes, _courses(covariance)) * amplitude
+        moves = (Moves(platform_index, ways, np.ones((1, count, 1))),)
+    yield RandomError(
+        subject=subject(name, "navigation"),
+        unit="dB",
+        declared=np.ones(seen.cases) * seen.factor,
+        path=("platforms", name, "motion_error", "navigation"),
+        published=published,
+        full=full,
+        moves=moves,
+        navigation=errors,
+    )
+
+
+def _times(effect: RandomEffect, amplitude: Floats) -> RandomEffect:
+    """Multiply an effect by an amplitude, its spread included: the level of the file scales the whole error."""
+    return effect.times(amplitude)._replace(spread=effect.spread * amplitude)
+
+
+def _in_full_model(seen: SensorCases, covariance: AidedCovariance, along: Floats, at_nodes: Floats) -> RandomEffect:
+    """Effect of the position error in the full model.
+
+    `along` (3, nodes, cases) is the range error per metre east, north and up. `at_nodes` (nodes, orders) are the
+    Legendre polynomials at the nodes.
+    """
+    moved = np.einsum("no,oapbc,mp->nambc", at_nodes, covariance.of_orders, at_nodes, optimize=True)
+    of_range = np.einsum("anc,nambc,bmc->nmc", along, moved, along, optimize=True)
+    beyond = np.einsum("anc,abc,bnc->nc", along, covariance.beyond, along, optimize=True)
+    return seen.of_process(of_range, seen.exact.fit[0] @ beyond)
+
+
+def _published(seen: SensorCases, platform_index: int, covariance: AidedCovariance) -> RandomEffect:
+    """Effect of the position error in the published model, along the line of sight at mid-aperture."""
+    look = seen.vector(seen.geometry.both[platform_index].look)
+    count, k = LEGENDRE_LEADING.size, seen.exact.k
+    of_range = np.einsum("ac,oapbc,bc->opc", look, covariance.of_orders, look)
+    constant, linear, quadratic, cubic = np.maximum(
+        np.einsum("ooc->oc", of_range[:count, :count]) * np.square(LEGENDRE_LEADING)[:, None], 0.0
+    )
+    both = of_range[0, 1]
+    scaled = 1 / (2 * np.arange(len(of_range)) + 1.0)
+    resolved = np.einsum("ooc,o->c", of_range[count:, count:], scaled[count:])
+    beyond = resolved + np.einsum("ac,abc,bc->c", look, covariance.beyond, look)
+    spread = k * np.sqrt(np.maximum(beyond, 0.0)) / seen.factor
+    return RandomEffect(k * np.sqrt(quadratic), k * np.sqrt(cubic), spread, *seen.moved(constant, linear, both))
+
+
+def _courses(covariance: AidedCovariance) -> Floats:
+    """Legendre coefficients of independent position errors that add to the given joint covariance.
+
+    The result is (3, orders, errors, cases). The sum multiplies each error by an independent random number of variance 1. [m]
+    """
+    orders, axes, _, _, cases = covariance.of_orders.shape
+    flat = np.moveaxis(covariance.of_orders.reshape(orders * axes, orders * axes, cases), -1, 0)
+    return np.transpose(factor(flat).reshape(cases, orders, axes, -1), (2, 1, 3, 0))
+
+
+# ---------------------------------------------------------------------- from a mission to the covariance
+def navigation_errors(seen: SensorCases, name: str) -> NavigationErrors:
+    """Joint covariance of the position error of a platform's aided navigation in each case.
+
+    Cases with the same navigation and the same path are computed once.
+    """
+    navigation = seen.error(name).navigation
+    assert navigation is not None
+    inputs = _inputs(seen, name, navigation)
+    numbers = np.concatenate(
+        [array.reshape(-1, seen.cases) for array in (*inputs.values(), _path_numbers(seen, name))]
+    )
+    _, index, group = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
+    chosen = {key: array[..., index] for key, array in inputs.items()}
+    state: PlatformState = getattr(seen.geometry, name).of(index)
+    count = min(len(seen.exact.times), MOST_ORDERS)
+    return NavigationErrors(
+        covariance=_covariance(seen.mission, name, navigation, chosen, state, count).at(group.ravel())
+    )
+
+
+def _inputs(seen: SensorCases, name: str, navigation: Navigation) -> dict[str, Floats]:
+    """Numbers of an aided navigation in each case, (..., cases)."""
+    imu, gnss = navigation.imu, navigation.gnss
+    scalars = {
+        "half": seen.aperture_time / 2,
+        "before": navigation.before,
+        "after": navigation.after_s,
+        "rate": gnss.rate,
+        "heading": navigation.heading,
+        "correlation_time": math.inf if gnss.correlation_time is None else gnss.correlation_time,
+    }
+    vectors = {figure: getattr(imu, figure) or (0.0, 0.0, 0.0) for figure in AIDED_IMU_FIGURES}
+    vectors |= {"position": gnss.position, "velocity": gnss.velocity or (math.inf, math.inf, math.inf)}
+    inputs = {key: np.broadcast_to(np.asarray(value, dtype=float), (seen.cases,)) for key, value in scalars.items()}
+    inputs |= {key: seen.vector(value) for key, value in vectors.items()}
+    outages = [np.broadcast_to(end, (seen.cases,)) for outage in navigation.outages for end in outage]
+    inputs["outages"] = np.array(outages).reshape(-1, seen.cases)
+    lever = seen.error(name).lever_arm
+    inputs["arm"] = seen.vector((0.0, 0.0, 0.0) if lever is None or lever.arm is None else lever.arm)
+    return inputs
+
+
+def _path_numbers(seen: SensorCases, name: str) -> Floats:
+    """Numbers that determine the path of a platform in each case, (numbers, cases).
+
+    A path in pieces counts as a path of its own in each case.
+    """
+    state: PlatformState = getattr(seen.geometry, name)
+    vectors = [seen.vector(vector) for vector in (state.position, state.velocity, state.acceleration, *state.bends)]
+    if state.curve is not None:
+        vectors.append(np.arange(float(seen.cases))[None])
+    return np.concatenate(vectors)
+
+
+def _covariance(
+    mission: Mission,
+    name: str,
+    navigation: Navigation,
+    inputs: Mapping[str, Floats],
+    state: PlatformState,
+    order_count: int,
+) -> AidedCovariance:
+    """Joint covariance of the position error for the numbers of `_inputs` and the paths `state` of the same cases."""
+    half, is_smoothed = inputs["half"], navigation.is_smoothed
+    turns = np.broadcast_to(not state.is_straight if half.size == 1 else _turns(state), half.shape)
+    timeline = timeline_of([
+        FixSchedule(
+            half_s=half[case],
+            before_s=inputs["before"][case],
+            after_s=inputs["after"][case],
+            rate_hz=inputs["rate"][case],
+            outages=[(start, end) for start, end in inputs["outages"][:, case].reshape(-1, 2)],
+            turning_step_s=_TURNING_STEP_S if turns[case] else _STRAIGHT_STEP_S,
+            is_smoothed=is_smoothed,
+        )
+        for case in range(half.size)
+    ])  # fmt: skip
+    arm = inputs["arm"]
+    flight = flight_of(mission, state, half, timeline, arm if np.any(arm) else None)
+    figures = {figure: inputs[figure].T for figure in AIDED_IMU_FIGURES}
+    scale = np.zeros_like(figures["accelerometer_bias"])
+    scale[:, 2] = figures["accelerometer_scale_factor"][:, 2] * STANDARD_GRAVITY_MPS2
+    unit = InertialUnit(
+        accelerometer_bias_mps2=figures["accelerometer_bias"],
+        first_accelerometer_bias_mps2=np.hypot(figures["accelerometer_bias"], scale),
+        gyro_bias_radps=figures["gyro_bias"],
+        velocity_random_walk=figures["velocity_random_walk"],
+        angle_random_walk=figures["angle_random_walk"],
+    )
+    position, correlation_time = inputs["position"].T, inputs["correlation_time"]
+    wanders = np.isfinite(correlation_time)[:, None]
+    fixes = Fixes(
+        position_m=np.where(wanders, position / _WHITE_RATIO, position),
+        velocity_mps=inputs["velocity"].T,
+        wander_m=np.where(wanders, position, 0.0),
+        wander_time_s=correlation_time,
+    )
+    start = StartSigmas(heading_rad=inputs["heading"])
+    return aided_covariance(
+        timeline, flight, unit, fixes, start, half, order_count=order_count, is_smoothed=is_smoothed
+    )
+
+
+def _turns(state: PlatformState) -> Booleans:
+    """Whether the path of each case turns or changes its speed, (cases,) or one for all."""
+    bends = [np.abs(component) for vector in (state.acceleration, *state.bends) for component in vector]
+    return np.asarray(sum(bends) > 0) | (state.curve is not None)
+
+
+def flight_of(mission: Mission, state: PlatformState, half: Floats, timeline: Timeline, arm: Floats | None) -> Flight:
+    """Attitude and specific force of a platform between the moments of a timeline.
+
+    Beyond the aperture the platform flies straight on with the velocity at the end of the aperture; a platform in
+    free fall goes on falling.
+
+    Parameters
+    ----------
+    mission : Mission
+        Mission, whose scene has the axes of the result.
+    state : PlatformState
+        Path of the platform in each case.
+    half : (cases,)
+        Half the aperture time. [s]
+    timeline : Timeline
+        Moments of the flight.
+    arm : (3, cases), optional
+        Lever arm along the axes of the body. [m]
+    """
+    falling = 0.0 if state.fall is None else state.fall.share
+    moments, middles = timeline.times, timeline.middles
+    _, velocity = _extended(mission, state, half, moments, falling)
+    place, middle_velocity = _extended(mission, state, half, middles, falling)
+    steps = np.maximum(timeline.steps, 1e-12)  # steps of no duration only pad the columns
+    gravity = np.array(np.broadcast_arrays(*free_fall(tuple(place), tuple(middle_velocity), mission.scene.axes)))
+    force = (np.diff(velocity, axis=1) / steps - gravity) * (1 - np.asarray(falling))
+    axes = body_axes_of(middle_velocity, state.is_still)
+    of_arm = None
+    if arm is not None:
+        of_arm = np.einsum("bc,bamc->mca", arm, body_axes_of(velocity, state.is_still))
+    return Flight(body=np.transpose(axes, (2, 3, 1, 0)), force=np.transpose(force, (1, 2, 0)), arm=of_arm)
+
+
+def _extended(
+    mission: Mission, state: PlatformState, half: Floats, times: Floats, falling: PerCase
+) -> tuple[Floats, Floats]:
+    """Positions [m] and velocities [m/s] of a platform within and beyond the aperture, (3, *times.shape).
+
+    `falling` is 1 for a platform in free fall, and 0 for any other.
+    """
+    inside = np.clip(times, -half, half)
+    place, velocity = (np.array(np.broadcast_arrays(*vector, inside)[:3]) for vector in state.at(inside))
+    beyond = times - inside
+    fallen = free_fall(tuple(place), tuple(velocity), mission.scene.axes)
+    fall = np.array(np.broadcast_arrays(*fallen)) * falling
+    return place + velocity * beyond + fall * beyond**2 / 2, velocity + fall * beyond

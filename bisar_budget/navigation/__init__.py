@@ -1,0 +1,6 @@
+"""Aided navigation: the covariance of the position error that an inertial unit with GNSS leaves over an aperture.
+
+The inertial unit integrates its measurements between the fixes of the GNSS receiver. A Kalman filter combines both; a
+smoother also uses the fixes after each moment. `timeline` has the moments of an analysis, `error_state` the growth of
+the errors between two moments, and `aided_covariance` the filter and the smoother.
+"""
