@@ -167,6 +167,10 @@ class CurvedPath(Protocol):
 class Fall(Protocol):
     """Dynamics of the errors of a platform in free fall; implemented by `paths.free_fall.FreeFall`."""
 
+    @property
+    def share(self) -> PerCase:
+        """1 in cases with a platform in free fall, 0 in all other cases."""
+
     def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
         """Motion over the aperture due to unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]
 

@@ -20,7 +20,7 @@ from bisar_budget.effects.random_effect import Moves, RandomEffect, RandomError,
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, Navigation
+from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, Navigation, Outage
 from bisar_budget.navigation.error_state import (
     ACCELEROMETER_BIAS,
     GYRO_BIAS,
@@ -91,17 +91,17 @@ def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
         return
     count, errors = len(seen.exact.times), navigation_errors(seen, name)
     covariance = errors.covariance
-    amplitude = 10 ** (np.asarray(navigation.level) / 20)
+    amplitude = np.asarray(10 ** (np.asarray(navigation.level) / 20), float)
     platform_index, places = PLATFORMS.index(name), seen.exact.sampling.places
     axes = np.eye(3)[:, :, None, None] * np.ones((1, 1, count, seen.cases))
     along = seen.range_errors(platform_index, axes)  # range error per metre east, north and up, (3, nodes, cases)
-    at_nodes = np.polynomial.legendre.legvander(places, covariance.order_count - 1)
+    at_nodes: Floats = np.polynomial.legendre.legvander(places, covariance.order_count - 1)
     effects = (
         _published(seen, platform_index, covariance),
         _in_full_model(seen, covariance, along, at_nodes),
     )
     published, full = (_times(effect, amplitude) for effect in effects)
-    moves = ()
+    moves: tuple[Moves, ...] = ()
     if seen.has_edge:
         ways = np.einsum("no,aokc->kanc", at_nodes, _courses(covariance)) * amplitude
         moves = (Moves(platform_index, ways, np.ones((1, count, 1))),)
@@ -151,9 +151,10 @@ def _published(seen: SensorCases, platform_index: int, covariance: AidedCovarian
 
 
 def _courses(covariance: AidedCovariance) -> Floats:
-    """Legendre coefficients of independent position errors that add to the given joint covariance.
+    """Legendre coefficients of independent position errors that add to the given joint covariance. [m]
 
-    The result is (3, orders, errors, cases). The sum multiplies each error by an independent random number of variance 1. [m]
+    The result is (3, orders, errors, cases). The sum multiplies each error by an independent random number of
+    variance 1.
     """
     orders, axes, _, _, cases = covariance.of_orders.shape
     flat = np.moveaxis(covariance.of_orders.reshape(orders * axes, orders * axes, cases), -1, 0)
@@ -225,16 +226,17 @@ def _covariance(
 ) -> AidedCovariance:
     """Joint covariance of the position error for the numbers of `_inputs` and the paths `state` of the same cases."""
     half, is_smoothed = inputs["half"], navigation.is_smoothed
-    turns = np.broadcast_to(not state.is_straight if half.size == 1 else _turns(state), half.shape)
+    turns = np.broadcast_to(_turns(state), half.shape)
     timeline = timeline_of([
-        FixSchedule(
-            half_s=half[case],
-            before_s=inputs["before"][case],
-            after_s=inputs["after"][case],
-            rate_hz=inputs["rate"][case],
-            outages=[(start, end) for start, end in inputs["outages"][:, case].reshape(-1, 2)],
-            turning_step_s=_TURNING_STEP_S if turns[case] else _STRAIGHT_STEP_S,
-            is_smoothed=is_smoothed,
+        fix_schedule(
+            navigation._replace(
+                before=inputs["before"][case],
+                after=inputs["after"][case] if is_smoothed else None,
+                gnss=navigation.gnss._replace(rate=inputs["rate"][case]),
+                outages=tuple(Outage(start, end) for start, end in inputs["outages"][:, case].reshape(-1, 2)),
+            ),
+            half[case],
+            turns=bool(turns[case]),
         )
         for case in range(half.size)
     ])  # fmt: skip
@@ -261,6 +263,22 @@ def _covariance(
     start = StartSigmas(heading_rad=inputs["heading"])
     return aided_covariance(
         timeline, flight, unit, fixes, start, half, order_count=order_count, is_smoothed=is_smoothed
+    )
+
+
+def fix_schedule(navigation: Navigation, half: float, *, turns: bool = True) -> FixSchedule:
+    """Schedule of the fixes of an aided navigation, in plain numbers.
+
+    `half` is half the aperture time. [s] `turns` tells whether the path turns within the aperture.
+    """
+    return FixSchedule(
+        half_s=half,
+        before_s=navigation.before,
+        after_s=float(navigation.after_s),
+        rate_hz=navigation.gnss.rate,
+        outages=navigation.outages,
+        turning_step_s=_TURNING_STEP_S if turns else _STRAIGHT_STEP_S,
+        is_smoothed=navigation.is_smoothed,
     )
 
 

@@ -220,26 +220,18 @@ class Navigation(NamedTuple):
         """Refuse fixes after the aperture for a filter, and figures that no part can supply."""
         if values.get("method") == FILTERED_METHOD and values.get("after"):
             yield Problem("a filter uses no fixes after the aperture", "accepted: no after, or 0 s", at=("after",))
-        yield from missing_figures(values.get("imu"), values.get("gnss"))
+        for key in ("imu", "gnss"):
+            section: AidedImu | AidedGnss | None = values.get(key)
+            if section is not None and section.sensor is None:
+                for figure in missing_figures(section):
+                    accepted = f"accepted: a figure of a data sheet, or {key}.sensor: a part that states it"
+                    yield Problem(MISSING, accepted, at=(key, figure))
 
 
-def missing_figures(imu: AidedImu | None, gnss: AidedGnss | None) -> Iterator[Problem]:
-    """Yield a problem for each figure that an aided navigation needs and that neither the file nor a part states.
-
-    A section that names a part is complete until the part is read. A section that is None was invalid.
-    """
-    if imu is not None and imu.sensor is None:
-        yield from missing_imu_figures(imu, "accepted: a data-sheet figure, or sensor: a part that states it")
-    if gnss is not None and gnss.sensor is None and gnss.position is None:
-        yield Problem(MISSING, "accepted: the error of a fix, or sensor: a GNSS receiver", at=("gnss", "position"))
-
-
-def missing_imu_figures(imu: AidedImu, accepted: str) -> Iterator[Problem]:
-    """Yield a problem for each of the four figures of an inertial unit that is missing or zero."""
-    for figure in NEEDED_IMU_FIGURES:
-        value: Vector | None = getattr(imu, figure)
-        if value is None:
-            yield Problem(MISSING, accepted, at=("imu", figure))
+def missing_figures(section: AidedImu | AidedGnss) -> list[str]:
+    """Keys of the figures that an aided navigation needs and that a section does not state."""
+    needed = NEEDED_IMU_FIGURES if isinstance(section, AidedImu) else ("position",)
+    return [figure for figure in needed if getattr(section, figure) is None]
 
 
 NAVIGATION = Section(Navigation)

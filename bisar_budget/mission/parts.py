@@ -609,34 +609,39 @@ def _with_aiding_parts(
     Figures that come from parts are appended to `taken`. A figure that the file states replaces that of a part.
     """
     overridden, of_parts, is_valid = [], dict[str, str](), True
-    sections: dict[str, AidedImu | AidedGnss] = {"imu": navigation.imu, "gnss": navigation.gnss}
-    figures_of_kind = {"imu": AIDED_IMU_FIGURES, "gnss": AIDED_GNSS_FIGURES}
-    for kind, section in sections.items():
+    for kind, known in (("imu", AIDED_IMU_FIGURES), ("gnss", AIDED_GNSS_FIGURES)):
+        section: AidedImu | AidedGnss = getattr(navigation, kind)
         entries = _parts_of(section.sensor, (*path, kind, "sensor"), (kind,), find, report)
         if entries is INVALID:
             is_valid = False
             continue
         for name, entry in entries.items():
-            figures = {}
-            for figure, text in entry.figures.items():
-                if figure not in figures_of_kind[kind]:
-                    continue
-                if getattr(section, figure) is None:
-                    figures[figure] = getattr(entry.part, figure)
-                else:
-                    key = f"motion_error.navigation.{kind}.{figure}"
-                    overridden.append(Overridden(f"{kind}.{figure}", key, entry.part.name, text))
-            sections[kind] = section._replace(sensor=None, **figures)
+            stated = [figure for figure in entry.figures if figure in known]
+            figures = {figure: getattr(entry.part, figure) for figure in stated if getattr(section, figure) is None}
+            overridden += [
+                Overridden(
+                    f"{kind}.{figure}",
+                    f"motion_error.navigation.{kind}.{figure}",
+                    entry.part.name,
+                    entry.figures[figure],
+                )
+                for figure in stated
+                if figure not in figures
+            ]
+            section = section._replace(**figures)
             of_parts |= {f"{kind}.{figure}": evidence(entry.part, figure) for figure in figures}
             taken += _taken(name, entry, (*path, kind), figures)
-            for problem in missing_figures(**{"imu": None, "gnss": None, kind: sections[kind]}):
-                words = f"{problem.problem}: {shown(entry.part.name)} states none"
-                report(path, problem._replace(problem=words))
+            for figure in missing_figures(section):
+                problem = f"is missing: {shown(entry.part.name)} states none"
+                report((*path, kind, figure), Problem(problem, f"accepted: {figure}, or another part"))
                 is_valid = False
-            sections[kind] = sections[kind]._replace(sensor=name)
+        if isinstance(section, AidedImu):
+            navigation = navigation._replace(imu=section)
+        else:
+            navigation = navigation._replace(gnss=section)
     if not is_valid:
         return INVALID
-    return navigation._replace(**sections, of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+    return navigation._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:

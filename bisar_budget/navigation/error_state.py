@@ -96,7 +96,7 @@ def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Float
     """
     matrices = np.zeros((*steps.shape, size, size))
     matrices[..., range(size), range(size)] = 1.0
-    tilted = _acceleration_by_tilt(force)
+    tilted = moved_by_tilt(force)
     tilted_by_gyro, t = tilted @ body, steps[..., None, None]
     for rows, columns, block, power in (
         (POSITION, VELOCITY, np.eye(3), 1),
@@ -115,12 +115,13 @@ def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Float
     return matrices
 
 
-def step_noise(steps: Floats, body: Floats, force: Floats, unit: InertialUnit, fixes: Fixes, size: int) -> Floats:
+def step_noise(steps: Floats, body: Floats, force: Floats, unit: InertialUnit, fixes: Fixes) -> Floats:
     """Covariance of the noise that each step adds to the state, (steps, cases, size, size).
 
     The arguments are those of `transitions`.
     """
-    noise, tilted = np.zeros((*steps.shape, size, size)), _acceleration_by_tilt(force)
+    size = fixes.state_size
+    noise, tilted = np.zeros((*steps.shape, size, size)), moved_by_tilt(force)
     walk = math.sqrt(2 / BIAS_WALK_TIME_S)
     accelerations, rates = body * unit.velocity_random_walk[:, None], body * unit.angle_random_walk[:, None]
     accelerometer_walk = walk * unit.accelerometer_bias_mps2[:, None]
@@ -159,8 +160,12 @@ def _add_impulse_responses(noise: Floats, steps: Floats, responses: Sequence[tup
         noise[..., rows, columns] += a @ np.swapaxes(b, -1, -2) * growth
 
 
-def _acceleration_by_tilt(force: Floats) -> Floats:
-    """Matrix A of the acceleration error A·ψ = ψ × f of a tilt ψ, (..., 3, 3). [m/s²/rad]"""
-    x, y, z = np.moveaxis(force, -1, 0)
+def moved_by_tilt(vectors: Floats) -> Floats:
+    """Matrices A of the products A·ψ = ψ × v of a tilt ψ with vectors v (..., 3), (..., 3, 3).
+
+    For the specific force, the product is the acceleration error due to the tilt. For a lever arm, it is the
+    displacement of the arm's end.
+    """
+    x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
-    return np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=-1).reshape(*force.shape[:-1], 3, 3)
+    return np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=-1).reshape(*vectors.shape[:-1], 3, 3)

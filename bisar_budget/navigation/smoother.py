@@ -1,8 +1,9 @@
 """Filter and smoother of an aided navigation: the joint covariance of its position error over an aperture.
 
 The errors of a navigation at two moments are correlated, and this correlation decides how an aperture is defocused.
-The covariance is computed without simulated flights. A Kalman filter runs over all fixes. After a fix, the error of the filter is e_k with the covariance P_k, and the next error is M_k·e_k plus noise
-that is new. Two errors of the filter therefore have the covariance
+The covariance is computed without simulated flights. A Kalman filter runs over all fixes. After a fix, the error of
+the filter is e_k with the covariance P_k, and the next error is M_k·e_k plus noise that is new. Two errors of the
+filter therefore have the covariance
 
     Cov(e_i, e_j) = P_i·Ψ(j, i)ᵀ,    Ψ(j, i) = M_{j−1} ⋯ M_i,    M_k = (1 − K_{k+1}·H)·Φ_k,    i ≤ j.
 
@@ -18,11 +19,12 @@ Only integrals of the position error over the aperture are needed, so the sums o
 with Ψ, and the memory does not grow with the square of the number of moments.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bisar_budget.arrays import Floats, Indices
+from bisar_budget.arrays import Booleans, Floats, Indices
 from bisar_budget.navigation.error_state import (
     ACCELEROMETER_BIAS,
     FIX_WANDER,
@@ -32,6 +34,7 @@ from bisar_budget.navigation.error_state import (
     VELOCITY,
     Fixes,
     InertialUnit,
+    moved_by_tilt,
     step_noise,
     transitions,
 )
@@ -154,21 +157,10 @@ def aided_covariance(
     """
     steps, cases = timeline.steps.shape
     block = max(1, int(_BLOCK_BYTES / (steps * fixes.state_size**2 * 8 * 3)))
+    navigation = _Navigation(timeline, flight, unit, fixes, start, half_s)
     parts = [
-        _block_covariance(
-            Timeline(
-                timeline.times[:, part], timeline.is_fix[:, part], timeline.weights[:, part], timeline.middle[part]
-            ),
-            flight.of(part),
-            InertialUnit(**{name: sigmas[part] for name, sigmas in vars(unit).items()}),
-            Fixes(**{name: sigmas[part] for name, sigmas in vars(fixes).items()}),
-            StartSigmas(**{**vars(start), "heading_rad": start.heading_rad[part]}),
-            half_s[part],
-            fixes.state_size,
-            order_count,
-            is_smoothed=is_smoothed,
-        )
-        for part in (slice(first, first + block) for first in range(0, cases, block))
+        _integrals(navigation.of(slice(first, first + block)), order_count, is_smoothed=is_smoothed)
+        for first in range(0, cases, block)
     ]
     of_orders, beyond, at_middle = (np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True))
     return AidedCovariance(
@@ -176,100 +168,145 @@ def aided_covariance(
     )
 
 
-def _block_covariance(
-    timeline: Timeline,
-    flight: Flight,
-    unit: InertialUnit,
-    fixes: Fixes,
-    start: StartSigmas,
-    half_s: Floats,
-    size: int,
-    order_count: int,
-    *,
-    is_smoothed: bool,
-) -> tuple[Floats, Floats, Floats]:
-    """Fields of `AidedCovariance` for a block of cases; `size` is the number of states."""
-    steps = timeline.steps
+@dataclass(frozen=True)
+class _Navigation:
+    """A navigation in each case, as described in `aided_covariance`."""
+
+    timeline: Timeline
+    flight: Flight
+    unit: InertialUnit
+    fixes: Fixes
+    start: StartSigmas
+    half_s: Floats
+
+    def of(self, cases: slice) -> "_Navigation":
+        """Navigation in some of the cases."""
+        timeline = self.timeline
+        return _Navigation(
+            Timeline(
+                timeline.times[:, cases],
+                timeline.is_fix[:, cases],
+                timeline.weights[:, cases],
+                timeline.middle[cases],
+            ),
+            self.flight.of(cases),
+            InertialUnit(**{name: sigmas[cases] for name, sigmas in vars(self.unit).items()}),
+            Fixes(**{name: sigmas[cases] for name, sigmas in vars(self.fixes).items()}),
+            replace(self.start, heading_rad=self.start.heading_rad[cases]),
+            self.half_s[cases],
+        )
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Indices of the first and the last moment that a node or mid-aperture needs in any case."""
+        nodes, middle = np.flatnonzero(self.timeline.weights.any(axis=1)), self.timeline.middle
+        return int(min(nodes[0], middle.min())), int(max(nodes[-1], middle.max()))
+
+
+@dataclass(frozen=True)
+class _Filtered:
+    """Result of the filter: covariances P at the moments of the aperture, and matrices of each step.
+
+    `covariances` maps the index of a moment to P. `propagation` is M of each step, and `information` is
+    (H·Φ)ᵀ·S⁻¹·H·Φ of the fix at its end, both (steps, cases, states, states).
+    """
+
+    covariances: Mapping[int, Floats]
+    propagation: Floats
+    information: Floats
+
+
+def _filtered(navigation: _Navigation) -> _Filtered:
+    """Run the filter from the start of the flight to its end."""
+    timeline, flight, unit, fixes = navigation.timeline, navigation.flight, navigation.unit, navigation.fixes
+    (first, last), steps, size = navigation.span, timeline.steps, fixes.state_size
     phi = transitions(steps, flight.body, flight.force, fixes.wander_time_s, size)
-    noise = step_noise(steps, flight.body, flight.force, unit, fixes, size)
-    measured, fix_variances = _measurement(fixes, size)
-    has_fix, has_node = timeline.is_fix.any(axis=1), (timeline.weights > 0).any(axis=1)
-    nodes = np.flatnonzero(has_node)
-    first, last = min(nodes[0], timeline.middle.min()), max(nodes[-1], timeline.middle.max())
-
-    # Forwards: covariance of the filter after each moment, and the propagation M of its error.
-    P = _start_covariance(start, unit, fixes, size)
-    kept: dict[int, Floats] = {}
-    propagation, information = np.empty_like(phi), np.zeros_like(phi)
+    noise = step_noise(steps, flight.body, flight.force, unit, fixes)
+    measured, variances = _measurement(fixes)
+    P, covariances, information = _start_covariance(navigation.start, unit, fixes), {}, np.zeros_like(phi)
+    has_fix: Booleans = np.asarray(timeline.is_fix.any(axis=1))
     if has_fix[0]:
-        P, _, _ = _updated(P, measured, fix_variances, timeline.is_fix[0])
-    for k in range(len(steps)):
-        if first <= k <= last:
-            kept[k] = P
-        P = phi[k] @ P @ np.swapaxes(phi[k], -1, -2) + noise[k]
-        if has_fix[k + 1]:
-            P, remaining, of_fix = _updated(P, measured, fix_variances, timeline.is_fix[k + 1])
-            propagation[k] = remaining @ phi[k]
-            information[k] = np.swapaxes(phi[k], -1, -2) @ of_fix @ phi[k]
-        else:
-            propagation[k] = phi[k]
-    if last == len(steps):
-        kept[last] = P
+        P, _, _ = _updated(P, measured, variances, timeline.is_fix[0])
+    for step in range(len(steps) + 1):
+        if first <= step <= last:
+            covariances[step] = P
+        if step == len(steps):
+            break
+        transition = phi[step]
+        P = transition @ P @ _transposed(transition) + noise[step]
+        if has_fix[step + 1]:
+            P, remaining, of_fix = _updated(P, measured, variances, timeline.is_fix[step + 1])
+            information[step] = _transposed(transition) @ of_fix @ transition
+            phi[step] = remaining @ transition
+    return _Filtered(covariances, phi, information)
 
-    # Backwards: covariance of the adjoint, which later fixes add.
-    adjoint = np.zeros_like(P)
-    unrevealed: dict[int, Floats] = {}  # 1 − Λ·P at each moment of the aperture
-    identity = np.eye(size)
-    for k in range(len(steps), first - 1, -1):
-        if is_smoothed and k < len(steps):
-            adjoint = np.swapaxes(propagation[k], -1, -2) @ adjoint @ propagation[k] + information[k]
-        if k <= last:
-            unrevealed[k] = identity - adjoint @ kept[k] if is_smoothed else np.broadcast_to(identity, P.shape)
 
-    # Forwards through the aperture: sums over pairs of moments, with P·Ψᵀ carried along.
-    cases = half_s.size
-    carried = np.zeros((cases, order_count, 3, size))
-    pairs = np.zeros((cases, order_count, 3, order_count, 3))
-    mean_square, at_middle = np.zeros((cases, 3, 3)), np.empty((cases, size, size))
-    scaled = 2 * np.arange(order_count) + 1.0
-    for k in range(first, last + 1):
-        is_middle = timeline.middle == k
-        if is_middle.any():
-            at_middle[is_middle] = (kept[k] @ unrevealed[k])[is_middle]
-        if has_node[k]:
-            seen = _antenna(flight, k, size, cases)
-            coefficients = timeline.weights[k][:, None] * scaled
-            coefficients = coefficients * np.polynomial.legendre.legvander(
-                timeline.times[k] / half_s, order_count - 1
-            )
-            own = seen @ kept[k]
-            now = np.swapaxes(seen @ np.swapaxes(unrevealed[k], -1, -2), -1, -2)  # (1 − Λ·P)·Bᵀ, (cases, states, 3)
-            joint = own @ now
-            mean_square += timeline.weights[k][:, None, None] * joint
-            of_earlier = carried.reshape(cases, -1, size) @ now
-            pairs += of_earlier.reshape(cases, order_count, 3, 1, 3) * coefficients[:, None, None, :, None]
-            both = coefficients[:, :, None] * coefficients[:, None, :] / 2
-            pairs += both[:, :, None, :, None] * joint[:, None, :, None, :]
-            carried += coefficients[:, :, None, None] * own[:, None]
-        if k < last:
-            carried = (carried.reshape(cases, -1, size) @ np.swapaxes(propagation[k], -1, -2)).reshape(carried.shape)
+def _unrevealed(filtered: _Filtered, span: tuple[int, int], *, is_smoothed: bool) -> dict[int, Floats]:
+    """Matrix 1 − Λ·P at each moment of the aperture, by the index of the moment.
+
+    It is the share of an error that later fixes do not reveal; 1 for the output of a filter.
+    """
+    (first, last), count = span, len(filtered.propagation)
+    identity = np.eye(filtered.information.shape[-1])
+    if not is_smoothed:
+        return {moment: np.broadcast_to(identity, P.shape) for moment, P in filtered.covariances.items()}
+    adjoint, unrevealed = np.zeros_like(filtered.covariances[first]), {}
+    for moment in range(count, first - 1, -1):
+        if moment < count:
+            step = filtered.propagation[moment]
+            adjoint = _transposed(step) @ adjoint @ step + filtered.information[moment]
+        if moment <= last:
+            unrevealed[moment] = identity - adjoint @ filtered.covariances[moment]
+    return unrevealed
+
+
+def _integrals(navigation: _Navigation, order_count: int, *, is_smoothed: bool) -> tuple[Floats, Floats, Floats]:
+    """Fields `of_orders`, `beyond` and `at_middle` of `AidedCovariance`."""
+    timeline, half, span = navigation.timeline, navigation.half_s, navigation.span
+    filtered = _filtered(navigation)
+    unrevealed = _unrevealed(filtered, span, is_smoothed=is_smoothed)
+    cases, size, degrees = half.size, navigation.fixes.state_size, 2 * np.arange(order_count) + 1.0
+    at_middle, mean_square = np.empty((cases, size, size)), np.zeros((cases, 3, 3))
+    # Sums over pairs of moments of the coefficients of the orders. `earlier` is the sum over all earlier moments with
+    # their covariance P·Ψᵀ to the present moment.
+    earlier, pairs = np.zeros((cases, order_count, 3, size)), np.zeros((cases, order_count, 3, order_count, 3))
+    for moment in range(span[0], span[1] + 1):
+        P, kept = filtered.covariances[moment], unrevealed[moment]
+        is_middle = timeline.middle == moment
+        at_middle[is_middle] = (P @ kept)[is_middle]
+        weights = timeline.weights[moment]
+        if np.any(weights):
+            antenna = _antenna(navigation, moment)
+            orders = np.polynomial.legendre.legvander(timeline.times[moment] / half, order_count - 1)
+            coefficients = weights[:, None] * degrees * orders
+            now, later = antenna @ P, kept @ _transposed(antenna)
+            own = now @ later
+            mean_square += weights[:, None, None] * own
+            with_earlier = (earlier.reshape(cases, -1, size) @ later).reshape(cases, order_count, 3, 3)
+            pairs += with_earlier[:, :, :, None] * coefficients[:, None, None, :, None]
+            pairs += np.einsum("co,cp,cab->coapb", coefficients / 2, coefficients, own)
+            earlier += coefficients[:, :, None, None] * now[:, None]
+        if moment < span[1]:
+            step = _transposed(filtered.propagation[moment])
+            earlier = (earlier.reshape(cases, -1, size) @ step).reshape(earlier.shape)
     of_orders = pairs + np.transpose(pairs, (0, 3, 4, 1, 2))
-    resolved = np.einsum("coaob,o->cab", of_orders, 1 / scaled)
-    return tuple(np.moveaxis(array, 0, -1) for array in (of_orders, mean_square - resolved, at_middle))
+    resolved = np.einsum("coaob,o->cab", of_orders, 1 / degrees)
+    return np.moveaxis(of_orders, 0, -1), np.moveaxis(mean_square - resolved, 0, -1), np.moveaxis(at_middle, 0, -1)
 
 
-def _measurement(fixes: Fixes, size: int) -> tuple[Floats, Floats]:
+def _measurement(fixes: Fixes) -> tuple[Floats, Floats]:
     """Matrix H of a fix, (6, states), and the variances of its errors, (cases, 6)."""
-    measured = np.zeros((6, size))
+    measured = np.zeros((6, fixes.state_size))
     measured[:3, POSITION] = measured[3:, VELOCITY] = np.eye(3)
-    if size > FIX_WANDER.start:
+    if fixes.state_size > FIX_WANDER.start:
         measured[:3, FIX_WANDER] = np.eye(3)
     variances = np.square(np.concatenate((fixes.position_m, fixes.velocity_mps), axis=1))
     return measured, np.minimum(variances, _NO_FIX_VARIANCE)
 
 
-def _start_covariance(start: StartSigmas, unit: InertialUnit, fixes: Fixes, size: int) -> Floats:
+def _start_covariance(start: StartSigmas, unit: InertialUnit, fixes: Fixes) -> Floats:
     """Covariance of the state at the start of the flight, (cases, states, states)."""
+    size = fixes.state_size
     sigmas = np.zeros((start.heading_rad.size, size))
     sigmas[:, POSITION], sigmas[:, VELOCITY], sigmas[:, TILT] = start.position_m, start.velocity_mps, start.tilt_rad
     sigmas[:, TILT.stop - 1] = start.heading_rad
@@ -279,7 +316,7 @@ def _start_covariance(start: StartSigmas, unit: InertialUnit, fixes: Fixes, size
     return np.asarray(np.square(sigmas)[:, :, None] * np.eye(size))
 
 
-def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Floats) -> tuple[Floats, Floats, Floats]:
+def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Booleans) -> tuple[Floats, Floats, Floats]:
     """Covariance after a fix, the matrix 1 − K·H, and the information Hᵀ·S⁻¹·H of the fix.
 
     Cases in which `is_taken` is false take a fix without information.
@@ -291,18 +328,20 @@ def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Floats) -
     of_fix = measured.T @ np.linalg.solve(S, np.broadcast_to(measured, (len(P), *measured.shape)))
     remaining = np.eye(P.shape[-1]) - P @ of_fix
     updated = remaining @ P
-    return (updated + np.swapaxes(updated, -1, -2)) / 2, remaining, of_fix
+    return (updated + _transposed(updated)) / 2, remaining, of_fix
 
 
-def _antenna(flight: Flight, k: int, size: int, cases: int) -> Floats:
+def _antenna(navigation: _Navigation, moment: int) -> Floats:
     """Matrix B of the position error B·e of the radar's antenna at a moment, (cases, 3, states).
 
     A tilt ψ moves the antenna by ψ × l, with the lever arm l.
     """
-    seen = np.zeros((cases, 3, size))
+    seen = np.zeros((navigation.half_s.size, 3, navigation.fixes.state_size))
     seen[:, range(3), range(POSITION.start, POSITION.stop)] = 1.0
-    if flight.arm is not None:
-        x, y, z = flight.arm[k].T
-        zero = np.zeros_like(x)
-        seen[:, :, TILT] = np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=-1).reshape(-1, 3, 3)
+    if navigation.flight.arm is not None:
+        seen[:, :, TILT] = moved_by_tilt(navigation.flight.arm[moment])
     return seen
+
+
+def _transposed(matrices: Floats) -> Floats:
+    return np.swapaxes(matrices, -1, -2)

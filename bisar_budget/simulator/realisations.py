@@ -42,6 +42,7 @@ from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
+from bisar_budget.simulator.flown_navigation import navigation_courses
 from bisar_budget.simulator.phase_history import Complexes, Course, Errors, Floats, PathError, PathSinusoid
 
 _WALK_STEPS = 512  # steps of a random walk from mid-aperture to the end of the aperture
@@ -164,6 +165,14 @@ def _arm_motions(
     return {error.owner: list(zip(drawn, body, strict=True))}
 
 
+def _navigation_motions(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Motions]:
+    """Draw the errors of an aided navigation, from simulated flights."""
+    courses = navigation_courses(mission, error.owner, times, draws, rng)
+    return {error.owner: [(courses[..., axis], direction) for axis, direction in enumerate(np.eye(3))]}
+
+
 # Functions that draw the motion of platforms, by kind of error.
 _MOTION_DRAWS: Mapping[
     str, Callable[[Mission, RandomError, Floats, int, np.random.Generator], dict[str, _Motions]]
@@ -171,6 +180,7 @@ _MOTION_DRAWS: Mapping[
     "imu": _sensor_motions,
     "lever_arm.attitude": _swing_motions,
     "lever_arm.uncertainty": _arm_motions,
+    "navigation": _navigation_motions,
     "random": _noise_motions,
     "trajectory": _noise_motions,
 }
@@ -372,6 +382,7 @@ class _DrawnErrors:
 _ADDITIONS: Mapping[str, Callable[[_DrawnErrors, RandomError, np.random.Generator], None]] = {
     "imu": _DrawnErrors.add_motion,
     "lever_arm": _DrawnErrors.add_motion,
+    "navigation": _DrawnErrors.add_motion,
     "random": _DrawnErrors.add_motion,
     "trajectory": _DrawnErrors.add_motion,
     "vibration": _DrawnErrors.add_vibration,

@@ -503,7 +503,7 @@ def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generato
 
     The fields of the result are (draws,).
     """
-    if error.kind.is_correlated:  # not smooth between the nodes, unlike integrated noise
+    if error.kind.is_correlated or error.navigation is not None:  # not smooth between the nodes
         return study.exact_effects(_smooth_noise(study, error, rng))
     moments = aperture_nodes(study.collection.aperture_time)
     return study.exact_effects(position_courses(study.mission, error, moments, _SIGMA_DRAWS, rng))
@@ -587,11 +587,11 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Draw correlated position noise, and return its smooth part at the nodes of exact ranges, by platform. [m]
+    """Draw noise of a position, and return its smooth part at the nodes of exact ranges, by platform. [m]
 
     Each array is (draws, nodes, 3). `_smooth_at_nodes` defines the smooth part.
     """
-    T, correlation_time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
+    T = study.collection.aperture_time
     times = _moments(study, _SERIES_SAMPLES)
     at_nodes = _smooth_at_nodes(T, times)
     blocks = [
@@ -601,7 +601,9 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
         }
         for _ in range(_SIGMA_DRAWS // _DELAY_BLOCK_DRAWS)
     ]
-    scale = math.sqrt(_power_of_samples(times, correlation_time))
+    scale = 1.0
+    if error.kind.is_correlated:
+        scale = math.sqrt(_power_of_samples(times, process_of(study.mission, error).correlation_time))
     return {name: np.concatenate([block[name] for block in blocks]) * scale for name in blocks[0]}
 
 

@@ -65,6 +65,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
+from bisar_budget.report.explain.explained_navigation import navigation_steps
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
 from bisar_budget.report.explain.notation import (
     Step,
@@ -94,6 +95,8 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     """Yield the explanation steps for a random error, from its line in the mission file to its allowable."""
     mission, model = analysis.mission, row.model or "published"
     yield from _declared(mission, error, row)
+    if error.navigation is not None:
+        yield from navigation_steps(analysis, error, row.binding_requirement)
     yield from error.subject.facts.find_in(RANDOM_STEPS, error.subject.axis)(analysis, error)
     if model == "full":
         yield from _by_exact_ranges(mission, error)
@@ -666,6 +669,11 @@ def _from_elsewhere(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     yield effect_from_elsewhere()
 
 
+def _nothing_more(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """Yield no step: `navigation_steps` explains an aided navigation."""
+    yield from ()
+
+
 RANDOM_STEPS: Mapping[str, Callable[[Analysis, RandomError], Iterator[Step]]] = {
     "imu": _inertial,
     "lever_arm": _lever_arm,
@@ -676,6 +684,7 @@ RANDOM_STEPS: Mapping[str, Callable[[Analysis, RandomError], Iterator[Step]]] = 
     "oscillator.acceleration": _acceleration,
     "propagation": _delays,
     "synchronization": _link,
+    "navigation": _nothing_more,
     "other": _from_elsewhere,
 }
 

@@ -1,0 +1,224 @@
+"""Simulated flights of an inertial unit that GNSS fixes aid: position errors of the filter or of the smoother.
+
+Every flight draws the errors of the inertial unit and of each fix, and runs the filter on them. The smoother then
+corrects the flight backwards, with the innovations that were drawn. The flights check the joint covariance of
+`navigation.smoother`, so they do not use its formulas: the steps are integrated by series and by quadrature.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bisar_budget.arrays import Floats
+from bisar_budget.constants import STANDARD_GRAVITY_MPS2
+from bisar_budget.effects.aided_navigation import fix_schedule, flight_of
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.navigation import Navigation
+from bisar_budget.navigation.timeline import Timeline
+
+# Start of the flight: position [m], velocity [m/s] and tilt [rad]; the file states the heading.
+_START_SIGMAS = (10.0, 1.0, math.radians(1))
+_BIAS_WALK_TIME_S = 600.0
+_WHITE_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
+_LONGEST_STEP_S = 0.1
+_APERTURE_STEPS = 256
+_ERROR_STATES, _QUADRATURE_NODES = 15, 5
+_BLOCK_DRAWS = 500  # flights that are simulated together
+
+
+def navigation_courses(mission: Mission, name: str, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
+    """Draw position errors of a platform's aided navigation within an aperture, for one sigma, (draws, times, 3). [m]
+
+    `times` (times,) are slow times within the aperture. [s] The errors are those of the antenna, east, north and up.
+    The `level` of the file scales them.
+    """
+    navigation: Navigation = getattr(mission.platforms, name).motion_error.navigation
+    flights = _Flights(mission, name, navigation)
+    blocks = [flights.drawn(min(_BLOCK_DRAWS, draws - first), rng) for first in range(0, draws, _BLOCK_DRAWS)]
+    errors = np.concatenate(blocks) * 10 ** (navigation.level / 20)
+    series = [[np.interp(times, flights.shown, course) for course in flight.T] for flight in errors]
+    return np.moveaxis(np.array(series).reshape(draws, 3, times.size), 1, 2)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step of the flight: its transition, a factor of its noise, and the gain of the fix at its end.
+
+    `gain` and `inverse` are None without a fix. `inverse` is the inverse covariance of the innovation.
+    """
+
+    transition: Floats
+    noise: Floats
+    gain: Floats | None = None
+    inverse: Floats | None = None
+
+
+class _Flights:
+    """Flights of one platform: steps between moments, and the filter that all flights share."""
+
+    def __init__(self, mission: Mission, name: str, navigation: Navigation) -> None:
+        half = mission.collection.aperture_time / 2
+        schedule = fix_schedule(navigation, half)
+        grid = np.linspace(-half, half, _APERTURE_STEPS + 1)
+        ends = (-half - navigation.before, half + navigation.after_s)
+        coarse = np.linspace(*ends, 2 + math.ceil((ends[1] - ends[0]) / _LONGEST_STEP_S))
+        moments: Floats = np.unique(np.round(np.concatenate((grid, coarse, schedule.fixes())), 9)).astype(float)
+        is_fix = np.isin(moments, np.round(schedule.fixes(), 9))
+        is_shown = np.isin(moments, np.round(grid, 9))
+        self.navigation, self.is_fix, self.is_shown = navigation, is_fix, is_shown
+        self.shown: Floats = np.asarray(moments[is_shown], float)
+        error = getattr(mission.platforms, name).motion_error
+        arm = None if error.lever_arm is None or error.lever_arm.arm is None else np.array(error.lever_arm.arm)
+        timeline = Timeline(moments[:, None], is_fix[:, None], np.zeros((moments.size, 1)), np.zeros(1, int))
+        flight = flight_of(
+            mission,
+            getattr(mission.platforms, name).state,
+            np.array([half]),
+            timeline,
+            None if arm is None else arm[:, None],
+        )
+        self.arms = None if flight.arm is None else flight.arm[is_shown, 0]
+        self.wanders = navigation.gnss.correlation_time is not None
+        self.size = _ERROR_STATES + (3 if self.wanders else 0)
+        self._steps(moments, flight.body[:, 0], flight.force[:, 0])
+
+    def _steps(self, moments: Floats, body: Floats, force: Floats) -> None:
+        """Run the filter once: transitions, noise and gains of all steps, and covariances at the moments shown."""
+        gnss, measured = self.navigation.gnss, np.zeros((6, self.size))
+        measured[:6, :6] = np.eye(6)
+        position = np.array(gnss.position or ())
+        sigmas = position / _WHITE_RATIO if self.wanders else position
+        if self.wanders:
+            measured[:3, _ERROR_STATES:] = np.eye(3)
+        if gnss.velocity is None:
+            measured = measured[:3]
+        else:
+            sigmas = np.concatenate((sigmas, gnss.velocity))
+        self.measured, self.sigmas = measured, sigmas
+        self.start = self._start()
+        P = np.diag(np.square(self.start))
+        self.first_gain = self._gain(P) if self.is_fix[0] else None
+        if self.first_gain is not None:
+            P = P - self.first_gain[0] @ measured @ P
+        self.steps: list[_Step] = []
+        self.covariances = [P]
+        for step, duration in enumerate(np.diff(moments).tolist()):
+            transition, noise = self._moved(duration, body[step], force[step])
+            P = transition @ P @ transition.T + noise
+            gain, inverse = self._gain(P) if self.is_fix[step + 1] else (None, None)
+            if gain is not None:
+                P = P - gain @ measured @ P
+                P = (P + P.T) / 2
+            self.steps.append(_Step(transition, _square_root(noise), gain, inverse))
+            self.covariances.append(P)
+
+    def _start(self) -> Floats:
+        """Sigmas of the state at the start of the flight."""
+        imu, (position, velocity, tilt) = self.navigation.imu, _START_SIGMAS
+        bias = np.array(imu.accelerometer_bias or ())
+        if imu.accelerometer_scale_factor is not None:
+            bias[2] = math.hypot(bias[2], imu.accelerometer_scale_factor[2] * STANDARD_GRAVITY_MPS2)
+        start = [*[position] * 3, *[velocity] * 3, tilt, tilt, self.navigation.heading, *bias, *(imu.gyro_bias or ())]
+        return np.array([*start, *(self.navigation.gnss.position or ())] if self.wanders else start, float)
+
+    def _gain(self, P: Floats) -> tuple[Floats, Floats]:
+        """Gain of a fix, and the inverse covariance of its innovation."""
+        inverse = np.linalg.inv(self.measured @ P @ self.measured.T + np.diag(np.square(self.sigmas)))
+        return np.asarray(P @ self.measured.T @ inverse), np.asarray(inverse, float)
+
+    def _moved(self, duration: float, body: Floats, force: Floats) -> tuple[Floats, Floats]:
+        """Transition of a step by its series, and the covariance of its noise by Gauss–Legendre quadrature."""
+        imu, rate = self.navigation.imu, np.zeros((self.size, self.size))
+        rate[0:3, 3:6] = rate[6:9, 12:15] = np.eye(3)
+        rate[6:9, 12:15] = rate[3:6, 9:12] = body
+        for axis, tilt in enumerate(np.eye(3)):
+            rate[3:6, 6 + axis] = np.cross(tilt, force)
+        densities = np.zeros((self.size, 12))
+        densities[3:6, 0:3] = body * np.array(imu.velocity_random_walk)
+        densities[6:9, 3:6] = body * np.array(imu.angle_random_walk)
+        biases = np.concatenate((imu.accelerometer_bias or (), imu.gyro_bias or ()))
+        densities[9:15, 6:12] = np.diag(biases * math.sqrt(2 / _BIAS_WALK_TIME_S))
+        if self.wanders:
+            correlation_time = float(self.navigation.gnss.correlation_time or math.inf)
+            rate[_ERROR_STATES:, _ERROR_STATES:] = -np.eye(3) / correlation_time
+            wander = np.zeros((self.size, 3))
+            wander[_ERROR_STATES:] = np.diag(self.start[_ERROR_STATES:] * math.sqrt(2 / correlation_time))
+            densities = np.concatenate((densities, wander), axis=1)
+        noise = np.zeros((self.size, self.size))
+        for place, weight in zip(*np.polynomial.legendre.leggauss(_QUADRATURE_NODES), strict=True):
+            moved = _exponential(rate * (duration * (1 - place) / 2)) @ densities
+            noise += weight * duration / 2 * moved @ moved.T
+        return _exponential(rate * duration), noise
+
+    def drawn(self, draws: int, rng: np.random.Generator) -> Floats:
+        """Draw flights, and return their position errors at the moments shown, (draws, shown, 3). [m]"""
+        errors, innovations = self._filtered(draws, rng)
+        if self.navigation.is_smoothed:
+            shown = self._smoothed(errors, innovations)
+        else:
+            shown = [
+                self._at_antenna(error) for error, is_shown in zip(errors, self.is_shown, strict=True) if is_shown
+            ]
+        positions = np.array(shown)  # (shown, draws, 6): position and tilt
+        result = positions[..., :3]
+        if self.arms is not None:
+            result = result + np.cross(positions[..., 3:], self.arms[:, None])
+        return np.moveaxis(result, 0, 1)
+
+    @staticmethod
+    def _at_antenna(error: Floats) -> Floats:
+        """Errors of the state that move the antenna: position and tilt, (draws, 6)."""
+        return np.concatenate((error[:, :3], error[:, 6:9]), axis=1)
+
+    def _filtered(self, draws: int, rng: np.random.Generator) -> tuple[Sequence[Floats], Sequence[Floats | None]]:
+        """Errors of the filter after each moment, and the innovation of each fix."""
+        error = self.start * rng.standard_normal((draws, self.size))
+        innovations: list[Floats | None] = [None]
+        if self.first_gain is not None:
+            error, innovations[0] = self._corrected(error, self.first_gain[0], rng)
+        errors = [error]
+        for step in self.steps:
+            error = error @ step.transition.T + rng.standard_normal((draws, self.size)) @ step.noise.T
+            innovation = None
+            if step.gain is not None:
+                error, innovation = self._corrected(error, step.gain, rng)
+            errors.append(error)
+            innovations.append(innovation)
+        return errors, innovations
+
+    def _corrected(self, error: Floats, gain: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        innovation = error @ self.measured.T + self.sigmas * rng.standard_normal((len(error), self.sigmas.size))
+        return error - innovation @ gain.T, innovation
+
+    def _smoothed(self, errors: Sequence[Floats], innovations: Sequence[Floats | None]) -> list[Floats]:
+        """Errors of the smoother that move the antenna, at the moments shown."""
+        adjoint, shown = np.zeros_like(errors[0]), list[Floats]()
+        for moment in range(len(errors) - 1, -1, -1):
+            if self.is_shown[moment]:
+                shown.append(self._at_antenna(errors[moment] - adjoint @ self.covariances[moment]))
+            if moment:
+                step, innovation = self.steps[moment - 1], innovations[moment]
+                if step.gain is not None and step.inverse is not None and innovation is not None:
+                    adjoint = adjoint - adjoint @ step.gain @ self.measured
+                    adjoint = adjoint + innovation @ step.inverse @ self.measured
+                adjoint = adjoint @ step.transition
+        return shown[::-1]
+
+
+def _exponential(matrix: Floats) -> Floats:
+    """Exponential of a matrix with small elements, by its series."""
+    total, power = np.eye(len(matrix)), np.eye(len(matrix))
+    for order in range(1, 7):
+        power = power @ matrix / order
+        total = total + power
+    return total
+
+
+def _square_root(covariance: Floats) -> Floats:
+    """Factor F of a covariance, with FFᵀ equal to it; the states may have very different sizes."""
+    sigmas = np.sqrt(np.diagonal(covariance))
+    units = np.where(sigmas > 0, sigmas, 1.0)
+    squares, ways = np.linalg.eigh(covariance / np.multiply.outer(units, units))
+    return np.asarray(units[:, None] * ways * np.sqrt(np.maximum(squares, 0.0)))
