@@ -12,4 +12,5 @@ __all__ = [
     "solve",
     "sweep",
     "table",
+    "varied",
 ]

@@ -3,7 +3,7 @@
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from typing import NamedTuple
 
@@ -20,10 +20,17 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
+from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.workers import Progress, unseen
 
-_PART_KINDS_BY_SECTION = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
+# Sections of a platform that name parts, with the kinds of part that they accept.
+_PART_KINDS_BY_SECTION: Mapping[str, tuple[str, ...]] = {
+    "motion_error": ("imu", "gnss"),
+    "motion_error.navigation.imu": ("imu",),
+    "motion_error.navigation.gnss": ("gnss",),
+    "oscillator": ("oscillator",),
+}
 
 
 class PartState(NamedTuple):
@@ -105,9 +112,7 @@ class Comparison(NamedTuple):
 
 def is_sensor_key(key: str) -> bool:
     """Whether the values of a key are names of catalogue parts, so that `solve` compares parts for this key."""
-    return parts_of(key) in {
-        ("platforms", name, section, "sensor") for name in PLATFORMS for section in _PART_KINDS_BY_SECTION
-    }
+    return key in {f"platforms.{name}.{section}.sensor" for name in PLATFORMS for section in _PART_KINDS_BY_SECTION}
 
 
 def compare_parts(
@@ -128,7 +133,8 @@ def compare_parts(
     Parameters
     ----------
     key : str
-        `platforms.NAME.motion_error.sensor` or `platforms.NAME.oscillator.sensor`.
+        `platforms.NAME.motion_error.sensor`, `platforms.NAME.motion_error.navigation.imu.sensor` or the same of
+        `gnss`, or `platforms.NAME.oscillator.sensor`.
 
     Returns
     -------
@@ -234,11 +240,11 @@ class _PartSearch:
 
     def __init__(self, variation: Variation, key: str) -> None:
         self.variation, self.key = variation, key
-        _, self.platform, self.section, _ = parts_of(key)
+        _, self.platform, *section_keys, _ = parts_of(key)
+        self.section = ".".join(section_keys)
         folder = folder_of(variation.mission.file)
-        section = getattr(getattr(variation.mission.platforms, self.platform), self.section)
-        named = None if section is None else section.sensor
-        names = named if isinstance(named, tuple) else [named] if named else []
+        platform: Platform = getattr(variation.mission.platforms, self.platform)
+        names = [name for path, name in platform.parts.items() if path.startswith(f"{self.section}.sensor")]
         self.given = {name: find_part(name, folder) for name in names}
         given_kinds = {device.kind for device in self.given.values()}
         self.kinds = tuple(
@@ -276,8 +282,12 @@ class _PartSearch:
         part_figures = tuple(
             figure for figure in FIGURES[candidate.part.kind] if figure in taken and getattr(candidate.part, figure)
         )
-        section = getattr(getattr(mission.platforms, self.platform), self.section)
-        stated = tuple(each.figure for each in section.overridden if each.part == candidate.part.name)
+        platform: Platform = getattr(mission.platforms, self.platform)
+        stated = tuple(
+            each.figure.rpartition(".")[2]
+            for each in platform.overridden
+            if each.part == candidate.part.name and each.key.startswith(self.section)
+        )
         return candidate._replace(
             judged=judged_mission(Analysis(mission), today), figures=part_figures, stated=stated
         )
@@ -308,7 +318,9 @@ class _PartSearch:
         own_rows = [
             (each.utilization, each.id)
             for each in rows_in_words(judged, Case(judged.analysis))
-            if each.owner == self.platform and each.evidence in texts and each.utilization is not None
+            if each.owner == self.platform
+            and any(text in (each.evidence or "") for text in texts)
+            and each.utilization is not None
         ]
         use, own_row = max(own_rows, default=(None, None))
         return state._replace(standing=part_standing, own_row=own_row, own_utilization=use)

@@ -152,15 +152,19 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
 def usual_keys(mission: Mission) -> Iterator[str]:
     """Yield the keys that are specified by default: position, velocity, acceleration and clock errors.
 
-    Errors that a part or a covariance determines are left out.
+    Errors that a part or a covariance determines are left out. An aided navigation determines velocity and
+    acceleration, and is specified by its level.
     """
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         error = platform.motion_error
-        for state in STATE_KINDS[:1] if platform.state.is_still else STATE_KINDS:
+        is_aided = error.navigation is not None
+        for state in STATE_KINDS[:1] if platform.state.is_still or is_aided else STATE_KINDS:
             is_fixed = error.covariance is not None and state.has_covariance
             if not is_fixed and state.name not in dict(error.of_parts):
                 yield f"platforms.{name}.motion_error.{state.name}"
+        if is_aided and not error.navigation.of_parts:
+            yield f"platforms.{name}.motion_error.navigation.level"
     oscillators = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None]
     for name in oscillators:
         if getattr(mission.platforms, name).oscillator.sensor is None:
@@ -235,7 +239,7 @@ def suitable_parts(mission: Mission, specified: Specified, most: float, candidat
     *above, section, figure = parts_of(specified.key)
     if section == "oscillator" and figure == "level":
         yield from _quiet_oscillators(mission, above[-1], most, candidates)
-    kind = {"motion_error": "gnss", "imu": "imu"}.get(section)
+    kind = {"motion_error": "gnss", "gnss": "gnss", "imu": "imu"}.get(section)
     is_satellite = above[:1] == ["platforms"] and _is_satellite(getattr(mission.platforms, above[1]))
     for entry in candidates:
         serves = not is_satellite or getattr(entry.part, "in_orbit", None)

@@ -95,7 +95,7 @@ def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool)
     return (
         is_stated
         or steps[0] in ("imu", "registered")
-        or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"))
+        or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"), ("navigation", "level"))
     )
 
 

@@ -2,6 +2,7 @@
 
 # Names that other packages may import.
 __all__ = [
+    "aided_navigation",
     "air_delays",
     "combined",
     "declared",

@@ -17,7 +17,7 @@ from bisar_budget.constants import STANDARD_GRAVITY_MPS2
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.navigation_errors import body_axes_of
 from bisar_budget.effects.random_effect import Moves, RandomEffect, RandomError, SensorCases, factor
-from bisar_budget.geometry import PlatformState
+from bisar_budget.geometry import PlatformState, norm
 from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, Navigation, Outage
@@ -31,14 +31,15 @@ from bisar_budget.navigation.error_state import (
     Fixes,
     InertialUnit,
 )
-from bisar_budget.navigation.smoother import AidedCovariance, Flight, StartSigmas, aided_covariance
+from bisar_budget.navigation.smoother import AidedCovariance, FlightSteps, StartSigmas, aided_covariance
 from bisar_budget.navigation.timeline import FixSchedule, Timeline, timeline_of
 from bisar_budget.paths.earth import free_fall
 
 _TURNING_STEP_S = 0.1  # within which attitude and specific force may be taken as constant
 _STRAIGHT_STEP_S = 1.0
-_WHITE_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
-MOST_ORDERS = 24  # Legendre orders of the position error; higher ones only spread power
+_SHORTEST_STEP_S = 1e-12
+WHITE_SIGMA_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
+MOST_ORDER_COUNT = 24  # Legendre orders of the position error; higher ones only spread power
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,11 +92,11 @@ def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
         return
     count, errors = len(seen.exact.times), navigation_errors(seen, name)
     covariance = errors.covariance
-    amplitude = np.asarray(10 ** (np.asarray(navigation.level) / 20), float)
-    platform_index, places = PLATFORMS.index(name), seen.exact.sampling.places
+    amplitude: PerCase = 10 ** (navigation.level / 20)
+    platform_index, slow_times = PLATFORMS.index(name), seen.exact.sampling.places
     axes = np.eye(3)[:, :, None, None] * np.ones((1, 1, count, seen.cases))
     along = seen.range_errors(platform_index, axes)  # range error per metre east, north and up, (3, nodes, cases)
-    at_nodes: Floats = np.polynomial.legendre.legvander(places, covariance.order_count - 1)
+    at_nodes = np.asarray(np.polynomial.legendre.legvander(slow_times, covariance.order_count - 1), np.float64)
     effects = (
         _published(seen, platform_index, covariance),
         _in_full_model(seen, covariance, along, at_nodes),
@@ -117,7 +118,7 @@ def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
     )
 
 
-def _times(effect: RandomEffect, amplitude: Floats) -> RandomEffect:
+def _times(effect: RandomEffect, amplitude: PerCase) -> RandomEffect:
     """Multiply an effect by an amplitude, its spread included: the level of the file scales the whole error."""
     return effect.times(amplitude)._replace(spread=effect.spread * amplitude)
 
@@ -176,7 +177,7 @@ def navigation_errors(seen: SensorCases, name: str) -> NavigationErrors:
     _, index, group = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
     chosen = {key: array[..., index] for key, array in inputs.items()}
     state: PlatformState = getattr(seen.geometry, name).of(index)
-    count = min(len(seen.exact.times), MOST_ORDERS)
+    count = min(len(seen.exact.times), MOST_ORDER_COUNT)
     return NavigationErrors(
         covariance=_covariance(seen.mission, name, navigation, chosen, state, count).at(group.ravel())
     )
@@ -255,7 +256,7 @@ def _covariance(
     position, correlation_time = inputs["position"].T, inputs["correlation_time"]
     wanders = np.isfinite(correlation_time)[:, None]
     fixes = Fixes(
-        position_m=np.where(wanders, position / _WHITE_RATIO, position),
+        position_m=np.where(wanders, position / WHITE_SIGMA_RATIO, position),
         velocity_mps=inputs["velocity"].T,
         wander_m=np.where(wanders, position, 0.0),
         wander_time_s=correlation_time,
@@ -288,11 +289,14 @@ def _turns(state: PlatformState) -> Booleans:
     return np.asarray(sum(bends) > 0) | (state.curve is not None)
 
 
-def flight_of(mission: Mission, state: PlatformState, half: Floats, timeline: Timeline, arm: Floats | None) -> Flight:
+def flight_of(
+    mission: Mission, state: PlatformState, half: Floats, timeline: Timeline, arm: Floats | None
+) -> FlightSteps:
     """Attitude and specific force of a platform between the moments of a timeline.
 
     Beyond the aperture the platform flies straight on with the velocity at the end of the aperture; a platform in
-    free fall goes on falling.
+    free fall goes on falling. Gravity is that of mid-aperture, and points down in the axes of the scene: a navigation
+    turns its level axes along with the Earth's curvature.
 
     Parameters
     ----------
@@ -310,15 +314,16 @@ def flight_of(mission: Mission, state: PlatformState, half: Floats, timeline: Ti
     falling = 0.0 if state.fall is None else state.fall.share
     moments, middles = timeline.times, timeline.middles
     _, velocity = _extended(mission, state, half, moments, falling)
-    place, middle_velocity = _extended(mission, state, half, middles, falling)
-    steps = np.maximum(timeline.steps, 1e-12)  # steps of no duration only pad the columns
-    gravity = np.array(np.broadcast_arrays(*free_fall(tuple(place), tuple(middle_velocity), mission.scene.axes)))
-    force = (np.diff(velocity, axis=1) / steps - gravity) * (1 - np.asarray(falling))
+    _, middle_velocity = _extended(mission, state, half, middles, falling)
+    steps = np.maximum(timeline.steps, _SHORTEST_STEP_S)  # steps of no duration only pad the columns
+    acceleration = np.diff(velocity, axis=1) / steps
+    acceleration[2] += norm(free_fall(state.position, state.velocity, mission.scene.axes))
+    force = acceleration * (1 - np.asarray(falling))
     axes = body_axes_of(middle_velocity, state.is_still)
     of_arm = None
     if arm is not None:
         of_arm = np.einsum("bc,bamc->mca", arm, body_axes_of(velocity, state.is_still))
-    return Flight(body=np.transpose(axes, (2, 3, 1, 0)), force=np.transpose(force, (1, 2, 0)), arm=of_arm)
+    return FlightSteps(body=np.transpose(axes, (2, 3, 1, 0)), force=np.transpose(force, (1, 2, 0)), arm=of_arm)
 
 
 def _extended(
@@ -329,8 +334,8 @@ def _extended(
     `falling` is 1 for a platform in free fall, and 0 for any other.
     """
     inside = np.clip(times, -half, half)
-    place, velocity = (np.array(np.broadcast_arrays(*vector, inside)[:3]) for vector in state.at(inside))
+    position, velocity = (np.array(np.broadcast_arrays(*vector, inside)[:3]) for vector in state.at(inside))
     beyond = times - inside
-    fallen = free_fall(tuple(place), tuple(velocity), mission.scene.axes)
+    fallen = free_fall(tuple(position), tuple(velocity), mission.scene.axes)
     fall = np.array(np.broadcast_arrays(*fallen)) * falling
-    return place + velocity * beyond + fall * beyond**2 / 2, velocity + fall * beyond
+    return position + velocity * beyond + fall * beyond**2 / 2, velocity + fall * beyond

@@ -9,6 +9,7 @@ __all__ = [
     "instruments",
     "load",
     "model",
+    "navigation",
     "parts",
     "paths",
     "platforms",

@@ -637,6 +637,13 @@ class Platform(NamedTuple):
         return {key: name for key, name in names.items() if isinstance(name, str)}
 
     @property
+    def overridden(self) -> tuple[Overridden, ...]:
+        """Figures of parts, and of the path's source, that keys of the file replace."""
+        navigation, oscillator = self.motion_error.navigation, self.oscillator
+        of_navigation = () if navigation is None else navigation.overridden
+        return (*self.motion_error.overridden, *of_navigation, *(() if oscillator is None else oscillator.overridden))
+
+    @property
     def way(self) -> str:
         """First of the keys with which the file states the path, such as `orbit` or `slant_range`."""
         firsts = [way.keys[0] for way in WAYS]

@@ -2,5 +2,7 @@
 
 The inertial unit integrates its measurements between the fixes of the GNSS receiver. A Kalman filter combines both; a
 smoother also uses the fixes after each moment. `timeline` has the moments of an analysis, `error_state` the growth of
-the errors between two moments, and `aided_covariance` the filter and the smoother.
+the errors between two moments, and `smoother` the filter and the smoother.
 """
+
+__all__ = ("error_state", "smoother", "timeline")

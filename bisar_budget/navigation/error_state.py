@@ -25,8 +25,8 @@ from bisar_budget.arrays import Floats
 
 POSITION, VELOCITY, TILT, ACCELEROMETER_BIAS, GYRO_BIAS, FIX_WANDER = (slice(k, k + 3) for k in range(0, 18, 3))
 LEVEL_TILT, HEADING = slice(6, 8), slice(8, 9)  # of the tilt, about the horizontal axes and about up
-_ERROR_STATE_SIZE = 15
-_WANDERING_STATE_SIZE = 18
+_STATE_COUNT = 15
+_WANDERING_STATE_COUNT = 18
 BIAS_WALK_TIME_S = 600.0  # a bias walks by √2 of its own size in this time
 
 
@@ -75,7 +75,7 @@ class Fixes:
     @property
     def state_size(self) -> int:
         """Number of states that an analysis with these fixes needs."""
-        return _WANDERING_STATE_SIZE if np.any(self.wander_m > 0) else _ERROR_STATE_SIZE
+        return _WANDERING_STATE_COUNT if np.any(self.wander_m > 0) else _STATE_COUNT
 
 
 def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Floats, size: int) -> Floats:
@@ -109,7 +109,7 @@ def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Float
         (TILT, GYRO_BIAS, body, 1),
     ):
         matrices[..., rows, columns] = block * t**power / math.factorial(power)
-    if size > _ERROR_STATE_SIZE:
+    if size > _STATE_COUNT:
         for state in range(FIX_WANDER.start, FIX_WANDER.stop):
             matrices[..., state, state] = np.exp(-steps / wander_time_s)
     return matrices
@@ -144,7 +144,7 @@ def step_noise(steps: Floats, body: Floats, force: Floats, unit: InertialUnit, f
         ),
     ):
         _add_impulse_responses(noise, steps, responses)
-    if size > _ERROR_STATE_SIZE:
+    if size > _STATE_COUNT:
         grown = -np.expm1(-2 * steps / fixes.wander_time_s)
         for axis in range(3):
             state = FIX_WANDER.start + axis

@@ -41,7 +41,7 @@ from bisar_budget.navigation.error_state import (
 from bisar_budget.navigation.timeline import Timeline
 
 _NO_FIX_VARIANCE = 1e30  # of a fix that is not taken, in m² or m²/s²
-_BLOCK_BYTES = 64e6  # memory of the matrices of the steps of cases that are analysed together
+_STEP_MATRICES_BYTES = 64e6  # memory of the matrices of the steps of cases that are analysed together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class StartSigmas:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flight:
+class FlightSteps:
     """Attitude and specific force of a platform over the steps of a timeline.
 
     Attributes
@@ -80,10 +80,10 @@ class Flight:
     force: Floats
     arm: Floats | None = None
 
-    def of(self, cases: slice) -> "Flight":
-        """Flight in some of the cases."""
+    def of(self, cases: slice) -> "FlightSteps":
+        """FlightSteps in some of the cases."""
         arm = None if self.arm is None else self.arm[:, cases]
-        return Flight(body=self.body[:, cases], force=self.force[:, cases], arm=arm)
+        return FlightSteps(body=self.body[:, cases], force=self.force[:, cases], arm=arm)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ class AidedCovariance:
 
 def aided_covariance(
     timeline: Timeline,
-    flight: Flight,
+    flight: FlightSteps,
     unit: InertialUnit,
     fixes: Fixes,
     start: StartSigmas,
@@ -144,7 +144,7 @@ def aided_covariance(
     ----------
     timeline : Timeline
         Moments of the flight, with the fixes and the nodes over the aperture.
-    flight : Flight
+    flight : FlightSteps
         Attitude and specific force between these moments.
     unit, fixes, start
         Sigmas of the inertial unit, of the fixes, and at the start of the flight.
@@ -156,13 +156,13 @@ def aided_covariance(
         Whether fixes after a moment contribute; otherwise the errors of the output of the filter are described.
     """
     steps, cases = timeline.steps.shape
-    block = max(1, int(_BLOCK_BYTES / (steps * fixes.state_size**2 * 8 * 3)))
+    block = max(1, int(_STEP_MATRICES_BYTES / (steps * fixes.state_size**2 * 8 * 3)))
     navigation = _Navigation(timeline, flight, unit, fixes, start, half_s)
-    parts = [
+    blocks = [
         _integrals(navigation.of(slice(first, first + block)), order_count, is_smoothed=is_smoothed)
         for first in range(0, cases, block)
     ]
-    of_orders, beyond, at_middle = (np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True))
+    of_orders, beyond, at_middle = (np.concatenate(arrays, axis=-1) for arrays in zip(*blocks, strict=True))
     return AidedCovariance(
         of_orders=of_orders, beyond=beyond, at_middle=at_middle, fix_count=timeline.is_fix.sum(axis=0)
     )
@@ -173,7 +173,7 @@ class _Navigation:
     """A navigation in each case, as described in `aided_covariance`."""
 
     timeline: Timeline
-    flight: Flight
+    flight: FlightSteps
     unit: InertialUnit
     fixes: Fixes
     start: StartSigmas
@@ -280,11 +280,11 @@ def _integrals(navigation: _Navigation, order_count: int, *, is_smoothed: bool) 
             orders = np.polynomial.legendre.legvander(timeline.times[moment] / half, order_count - 1)
             coefficients = weights[:, None] * degrees * orders
             now, later = antenna @ P, kept @ _transposed(antenna)
-            own = now @ later
-            mean_square += weights[:, None, None] * own
+            with_itself = now @ later
+            mean_square += weights[:, None, None] * with_itself
             with_earlier = (earlier.reshape(cases, -1, size) @ later).reshape(cases, order_count, 3, 3)
             pairs += with_earlier[:, :, :, None] * coefficients[:, None, None, :, None]
-            pairs += np.einsum("co,cp,cab->coapb", coefficients / 2, coefficients, own)
+            pairs += np.einsum("co,cp,cab->coapb", coefficients / 2, coefficients, with_itself)
             earlier += coefficients[:, :, None, None] * now[:, None]
         if moment < span[1]:
             step = _transposed(filtered.propagation[moment])

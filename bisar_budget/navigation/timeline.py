@@ -11,9 +11,9 @@ import numpy as np
 
 from bisar_budget.arrays import Booleans, Floats, Indices
 
-_NODES_PER_PIECE = 2
-_FEWEST_PIECES = 12  # of an aperture
-_MOST_SMOOTHED_PIECES = 128  # a smoothed error has no jumps, so its pieces need not end at the fixes
+_PIECE_NODE_COUNT = 2
+_FEWEST_PIECE_COUNT = 12  # of an aperture
+_MOST_SMOOTHED_PIECE_COUNT = 128  # a smoothed error has no jumps, so its pieces need not end at the fixes
 _COINCIDENCE_S = 1e-9  # moments that are closer are one moment
 
 
@@ -62,16 +62,18 @@ class FixSchedule:
 
         The error of a filter jumps at each fix, so a piece does not extend over a fix. A smoothed error has no jumps.
         """
-        fewest = np.linspace(-self.half_s, self.half_s, _FEWEST_PIECES + 1)
+        fewest = np.linspace(-self.half_s, self.half_s, _FEWEST_PIECE_COUNT + 1)
         fixes = self.fixes()
         inner = fixes[np.abs(fixes) < self.half_s - _COINCIDENCE_S]
-        if self.is_smoothed and inner.size > _MOST_SMOOTHED_PIECES:
-            edges = np.linspace(-self.half_s, self.half_s, _MOST_SMOOTHED_PIECES + 1)
+        if self.is_smoothed and inner.size > _MOST_SMOOTHED_PIECE_COUNT:
+            edges = np.linspace(-self.half_s, self.half_s, _MOST_SMOOTHED_PIECE_COUNT + 1)
         else:
-            edges = _distinct(np.concatenate((fewest if inner.size < _FEWEST_PIECES else fewest[[0, -1]], inner)))
-        places, weights = np.polynomial.legendre.leggauss(_NODES_PER_PIECE)
+            edges = _distinct(
+                np.concatenate((fewest if inner.size < _FEWEST_PIECE_COUNT else fewest[[0, -1]], inner))
+            )
+        abscissas, weights = np.polynomial.legendre.leggauss(_PIECE_NODE_COUNT)
         middles, halves = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
-        times = middles[:, None] + halves[:, None] * places
+        times = middles[:, None] + halves[:, None] * abscissas
         return times.ravel(), (halves[:, None] * weights / (2 * self.half_s)).ravel()
 
 
@@ -139,10 +141,10 @@ def _divided(moments: Floats, half: float, inner: float, outer: float) -> Floats
     counts = np.maximum(1, np.ceil(steps / np.where(is_inner, inner, outer) - _COINCIDENCE_S)).astype(int)
     if np.all(counts == 1):
         return moments
-    parts = [
+    divided_steps = [
         start + step * np.arange(count) / count for start, step, count in zip(moments, steps, counts, strict=False)
     ]
-    return np.concatenate((*parts, moments[-1:]))
+    return np.concatenate((*divided_steps, moments[-1:]))
 
 
 def _distinct(moments: Floats) -> Floats:

@@ -13,19 +13,17 @@ import numpy as np
 
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import STANDARD_GRAVITY_MPS2
-from bisar_budget.effects.aided_navigation import fix_schedule, flight_of
+from bisar_budget.effects.aided_navigation import WHITE_SIGMA_RATIO, fix_schedule, flight_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import Navigation
+from bisar_budget.navigation.error_state import BIAS_WALK_TIME_S
+from bisar_budget.navigation.smoother import StartSigmas
 from bisar_budget.navigation.timeline import Timeline
 
-# Start of the flight: position [m], velocity [m/s] and tilt [rad]; the file states the heading.
-_START_SIGMAS = (10.0, 1.0, math.radians(1))
-_BIAS_WALK_TIME_S = 600.0
-_WHITE_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
 _LONGEST_STEP_S = 0.1
-_APERTURE_STEPS = 256
-_ERROR_STATES, _QUADRATURE_NODES = 15, 5
-_BLOCK_DRAWS = 500  # flights that are simulated together
+_APERTURE_STEP_COUNT = 256
+_STATE_COUNT, _QUADRATURE_NODE_COUNT = 15, 5
+_FLIGHT_COUNT = 500  # flights that are simulated together
 
 
 def navigation_courses(mission: Mission, name: str, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
@@ -36,7 +34,7 @@ def navigation_courses(mission: Mission, name: str, times: Floats, draws: int, r
     """
     navigation: Navigation = getattr(mission.platforms, name).motion_error.navigation
     flights = _Flights(mission, name, navigation)
-    blocks = [flights.drawn(min(_BLOCK_DRAWS, draws - first), rng) for first in range(0, draws, _BLOCK_DRAWS)]
+    blocks = [flights.drawn(min(_FLIGHT_COUNT, draws - first), rng) for first in range(0, draws, _FLIGHT_COUNT)]
     errors = np.concatenate(blocks) * 10 ** (navigation.level / 20)
     series = [[np.interp(times, flights.shown, course) for course in flight.T] for flight in errors]
     return np.moveaxis(np.array(series).reshape(draws, 3, times.size), 1, 2)
@@ -61,7 +59,7 @@ class _Flights:
     def __init__(self, mission: Mission, name: str, navigation: Navigation) -> None:
         half = mission.collection.aperture_time / 2
         schedule = fix_schedule(navigation, half)
-        grid = np.linspace(-half, half, _APERTURE_STEPS + 1)
+        grid = np.linspace(-half, half, _APERTURE_STEP_COUNT + 1)
         ends = (-half - navigation.before, half + navigation.after_s)
         coarse = np.linspace(*ends, 2 + math.ceil((ends[1] - ends[0]) / _LONGEST_STEP_S))
         moments: Floats = np.unique(np.round(np.concatenate((grid, coarse, schedule.fixes())), 9)).astype(float)
@@ -81,7 +79,7 @@ class _Flights:
         )
         self.arms = None if flight.arm is None else flight.arm[is_shown, 0]
         self.wanders = navigation.gnss.correlation_time is not None
-        self.size = _ERROR_STATES + (3 if self.wanders else 0)
+        self.size = _STATE_COUNT + (3 if self.wanders else 0)
         self._steps(moments, flight.body[:, 0], flight.force[:, 0])
 
     def _steps(self, moments: Floats, body: Floats, force: Floats) -> None:
@@ -89,9 +87,9 @@ class _Flights:
         gnss, measured = self.navigation.gnss, np.zeros((6, self.size))
         measured[:6, :6] = np.eye(6)
         position = np.array(gnss.position or ())
-        sigmas = position / _WHITE_RATIO if self.wanders else position
+        sigmas = position / WHITE_SIGMA_RATIO if self.wanders else position
         if self.wanders:
-            measured[:3, _ERROR_STATES:] = np.eye(3)
+            measured[:3, _STATE_COUNT:] = np.eye(3)
         if gnss.velocity is None:
             measured = measured[:3]
         else:
@@ -116,11 +114,12 @@ class _Flights:
 
     def _start(self) -> Floats:
         """Sigmas of the state at the start of the flight."""
-        imu, (position, velocity, tilt) = self.navigation.imu, _START_SIGMAS
+        imu, sigmas = self.navigation.imu, StartSigmas(heading_rad=np.array([self.navigation.heading]))
         bias = np.array(imu.accelerometer_bias or ())
         if imu.accelerometer_scale_factor is not None:
             bias[2] = math.hypot(bias[2], imu.accelerometer_scale_factor[2] * STANDARD_GRAVITY_MPS2)
-        start = [*[position] * 3, *[velocity] * 3, tilt, tilt, self.navigation.heading, *bias, *(imu.gyro_bias or ())]
+        start = [*[sigmas.position_m] * 3, *[sigmas.velocity_mps] * 3, *[sigmas.tilt_rad] * 2]
+        start += [*sigmas.heading_rad, *bias, *(imu.gyro_bias or ())]
         return np.array([*start, *(self.navigation.gnss.position or ())] if self.wanders else start, float)
 
     def _gain(self, P: Floats) -> tuple[Floats, Floats]:
@@ -139,16 +138,16 @@ class _Flights:
         densities[3:6, 0:3] = body * np.array(imu.velocity_random_walk)
         densities[6:9, 3:6] = body * np.array(imu.angle_random_walk)
         biases = np.concatenate((imu.accelerometer_bias or (), imu.gyro_bias or ()))
-        densities[9:15, 6:12] = np.diag(biases * math.sqrt(2 / _BIAS_WALK_TIME_S))
+        densities[9:15, 6:12] = np.diag(biases * math.sqrt(2 / BIAS_WALK_TIME_S))
         if self.wanders:
             correlation_time = float(self.navigation.gnss.correlation_time or math.inf)
-            rate[_ERROR_STATES:, _ERROR_STATES:] = -np.eye(3) / correlation_time
+            rate[_STATE_COUNT:, _STATE_COUNT:] = -np.eye(3) / correlation_time
             wander = np.zeros((self.size, 3))
-            wander[_ERROR_STATES:] = np.diag(self.start[_ERROR_STATES:] * math.sqrt(2 / correlation_time))
+            wander[_STATE_COUNT:] = np.diag(self.start[_STATE_COUNT:] * math.sqrt(2 / correlation_time))
             densities = np.concatenate((densities, wander), axis=1)
         noise = np.zeros((self.size, self.size))
-        for place, weight in zip(*np.polynomial.legendre.leggauss(_QUADRATURE_NODES), strict=True):
-            moved = _exponential(rate * (duration * (1 - place) / 2)) @ densities
+        for abscissa, weight in zip(*np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT), strict=True):
+            moved = _exponential(rate * (duration * (1 - abscissa) / 2)) @ densities
             noise += weight * duration / 2 * moved @ moved.T
         return _exponential(rate * duration), noise
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.arrays import Floats
+from bisar_budget.design.varied import scaled
 from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.navigation_errors import body_axes, specific_force
@@ -15,12 +15,13 @@ from bisar_budget.findings.row import NavigationState
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import Navigation
+from bisar_budget.mission.quantities import with_number
 from bisar_budget.navigation.error_state import ACCELEROMETER_BIAS, TILT, moved_by_tilt
 from bisar_budget.report.explain.notation import Step, WorkedEquation, step, with_unit
 from bisar_budget.units import format_quantity
 
 _FIGURE_FACTOR = 1.01  # by which each figure is changed to find its derivative
-_LEAST_EXPONENT = 0.005  # of a figure that is listed
+_LEAST_EXPONENT_RATIO = 0.005  # of a figure that is listed
 _APERTURE_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _FIGURE_UNITS = {
     "accelerometer_bias": "m/s^2",
@@ -34,7 +35,7 @@ _FIGURE_UNITS = {
 _STATE_UNITS = ("m", "m/s", "rad", "rad", "rad/s", "m/s^2")
 _STATE_WORDS = ("position", "velocity", "tilt (roll and pitch)", "heading", "gyro bias", "accelerometer bias")
 # What a requirement limits: its name, and the part of an effect.
-_PARTS = {
+_EFFECTS_BY_REQUIREMENT = {
     QUADRATIC: ("quadratic phase", "quadratic"),
     CUBIC: ("cubic phase", "cubic"),
     "islr": ("spread", "spread"),
@@ -49,7 +50,7 @@ def navigation_steps(analysis: Analysis, error: RandomError, binding: str | None
     """
     mission = analysis.mission
     navigation: Navigation = getattr(mission.platforms, error.owner).motion_error.navigation
-    yield step("Figures, 1 sigma, with their sources", *_figures(navigation))
+    yield step("Figures, 1 sigma; one for each axis, or three", *_figures(navigation))
     yield step(_method(mission, navigation))
     yield step(
         "Joint covariance Cov(δp(τ_i), δp(τ_j)) of the position error over the aperture: a Kalman filter gives P and "
@@ -75,9 +76,8 @@ def _figures(navigation: Navigation) -> Iterator[str]:
     for key, value in navigation.figures.items():
         unit = _FIGURE_UNITS[key.rpartition(".")[2]]
         sizes = dict.fromkeys(with_unit(float(size), unit) for size in value)
-        source = navigation.evidence(key)
-        yield f"{key} = {', '.join(sizes)}" + (f" ({source})" if source else "")
-    yield f"gnss.rate = {format_quantity(navigation.gnss.rate, 'Hz')}"
+        yield f"{key} = {', '.join(sizes)}"
+    yield f"gnss.rate = {with_unit(navigation.gnss.rate, 'Hz')}"
     if navigation.gnss.correlation_time is not None:
         yield f"gnss.correlation_time = {format_quantity(navigation.gnss.correlation_time, 's')}"
 
@@ -87,7 +87,7 @@ def _method(mission: Mission, navigation: Navigation) -> str:
     half = mission.collection.aperture_time / 2
     start, end = (
         format_quantity(-half - navigation.before, "s", 4),
-        format_quantity(half + navigation.after_s, "s", 4),
+        format_quantity(half + float(navigation.after_s), "s", 4),
     )
     outages = [f"{outage.start:g} s to {outage.end:g} s" for outage in navigation.outages]
     words = "Smoothed: fixes after a moment count too" if navigation.is_smoothed else "Output of a filter in flight"
@@ -113,7 +113,7 @@ def _correlation(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         return
     T, k = mission.collection.aperture_time, 2 * math.pi / mission.radar.wavelength
     values = {"a_tilt": math.sqrt(tilt), "a_bias": math.sqrt(bias)}
-    apart, together = math.sqrt(tilt + bias), math.sqrt(max(tilt + bias + 2 * both, 0.0))
+    apart, together = math.sqrt(tilt + bias), math.sqrt(max(float(tilt + bias + 2 * both), 0.0))
     yield step(
         "A tilt and an accelerometer bias both accelerate the navigation along the line of sight; the fixes see only "
         "their sum, so that the two are correlated and their sigmas must not be added",
@@ -131,24 +131,20 @@ def _correlation(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 def _derivatives(mission: Mission, navigation: Navigation, error: RandomError, binding: str) -> Iterator[Step]:
     """Yield the step that says which figure matters most to the requirement that limits the row."""
-    words, part = _PARTS.get(binding, _PARTS[QUADRATIC])
-    figures = dict(navigation.figures)
-    factors = np.ones((len(figures), len(figures) + 1))
-    factors[np.arange(len(figures)), np.arange(len(figures)) + 1] = _FIGURE_FACTOR
-    sections: dict[str, dict[str, tuple[Floats, ...]]] = {"imu": {}, "gnss": {}}
-    for (key, value), of_cases in zip(figures.items(), factors, strict=True):
-        section, _, figure = key.partition(".")
-        sections[section][figure] = tuple(of_cases * size for size in value)
-    varied = navigation._replace(
-        imu=navigation.imu._replace(**sections["imu"]), gnss=navigation.gnss._replace(**sections["gnss"])
-    )
-    effects = _effects(_with_navigation(mission, error.owner, varied), error.owner, len(figures) + 1)
-    sizes = np.asarray(getattr(effects, part))
+    words, effect_name = _EFFECTS_BY_REQUIREMENT.get(binding, _EFFECTS_BY_REQUIREMENT[QUADRATIC])
+    figures, varied = list(navigation.figures), mission
+    for row, figure in enumerate(figures, 1):
+        factors = np.where(np.arange(len(figures) + 1) == row, _FIGURE_FACTOR, 1.0)
+        varied = scaled(varied, f"platforms.{error.owner}.motion_error.navigation.{figure}", factors)
+    effects = _effects(varied, error.owner, len(figures) + 1)
+    sizes = np.asarray(getattr(effects, effect_name))
     if not sizes[0] > 0:
         return
     exponents = np.log(sizes[1:] / sizes[0]) / math.log(_FIGURE_FACTOR)
     ordered = sorted(zip(exponents, figures, strict=True), key=lambda pair: -abs(pair[0]))
-    lines = [f"{key}: {exponent:+.2f} % per percent" for exponent, key in ordered if abs(exponent) >= _LEAST_EXPONENT]
+    lines = [
+        f"{key}: {exponent:+.2f} % per percent" for exponent, key in ordered if abs(exponent) >= _LEAST_EXPONENT_RATIO
+    ]
     yield step(f"Change of the {words} by each figure, the largest first", *lines)
 
 
@@ -160,8 +156,7 @@ def _growth(mission: Mission, error: RandomError) -> Iterator[Step]:
     if any(path.curve is not None for path in mission.geometry.both):
         return
     times = np.array(_APERTURE_FACTORS) * mission.collection.aperture_time
-    longer = mission._replace(collection=mission.collection._replace(aperture_time=times))
-    effects = _effects(longer, error.owner, times.size)
+    effects = _effects(with_number(mission, "collection.aperture_time", times), error.owner, times.size)
     lines = [
         f"T = {time:.4g} s: QPE {math.degrees(quadratic):.3g}°, cubic {math.degrees(cubic):.3g}°, "
         f"rest {math.degrees(spread):.3g}° rms"
@@ -170,13 +165,6 @@ def _growth(mission: Mission, error: RandomError) -> Iterator[Step]:
         )
     ]
     yield step("The same navigation over other apertures: short ones grow with T, long ones saturate", *lines)
-
-
-def _with_navigation(mission: Mission, name: str, navigation: Navigation) -> Mission:
-    """Copy of a mission with another aided navigation of a platform."""
-    platform = getattr(mission.platforms, name)
-    changed = platform._replace(motion_error=platform.motion_error._replace(navigation=navigation))
-    return mission._replace(platforms=mission.platforms._replace(**{name: changed}))
 
 
 def _effects(mission: Mission, name: str, cases: int) -> RandomEffect:
