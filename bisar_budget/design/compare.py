@@ -244,7 +244,7 @@ class _PartSearch:
         self.section = ".".join(section_keys)
         folder = folder_of(variation.mission.file)
         platform: Platform = getattr(variation.mission.platforms, self.platform)
-        names = [name for path, name in platform.parts.items() if path.startswith(f"{self.section}.sensor")]
+        names = [name for path, name in platform.part_names.items() if path.startswith(f"{self.section}.sensor")]
         self.given = {name: find_part(name, folder) for name in names}
         given_kinds = {device.kind for device in self.given.values()}
         self.kinds = tuple(

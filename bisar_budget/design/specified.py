@@ -163,7 +163,7 @@ def usual_keys(mission: Mission) -> Iterator[str]:
             is_fixed = error.covariance is not None and state.has_covariance
             if not is_fixed and state.name not in dict(error.of_parts):
                 yield f"platforms.{name}.motion_error.{state.name}"
-        if is_aided and not error.navigation.of_parts:
+        if is_aided and not error.navigation.part_sources:
             yield f"platforms.{name}.motion_error.navigation.level"
     oscillators = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None]
     for name in oscillators:

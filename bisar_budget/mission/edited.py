@@ -79,7 +79,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Yield the key and the file name of each part that a mission names by its file, not by its catalogue name."""
     for owner, platform in mission.platforms._asdict().items():
-        for key, name in platform.parts.items():
+        for key, name in platform.part_names.items():
             if is_file(name):
                 yield f"platforms.{owner}.{key}", name
 

@@ -731,7 +731,7 @@ def flies_on_earth(mission: Mission) -> bool:
 
 def names_parts(mission: Mission) -> bool:
     """Whether a mission takes figures from parts of the catalogue."""
-    return any(platform.parts for platform in mission.platforms)
+    return any(platform.part_names for platform in mission.platforms)
 
 
 def names_requirements(root: Mapping[str, object]) -> bool:

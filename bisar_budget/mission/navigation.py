@@ -151,7 +151,7 @@ class _OutageReader(Reader[Outage]):
 class Navigation(NamedTuple):
     """An inertial unit that a GNSS receiver aids: its errors are those that a filter or a smoother leaves.
 
-    `of_parts` has the names of the figures that come from parts of the catalogue, each with its source. `overridden`
+    `part_sources` has the names of the figures that come from parts of the catalogue, each with its source. `overridden`
     lists the figures of parts that keys of the file replace.
     """
 
@@ -183,7 +183,7 @@ class Navigation(NamedTuple):
     ] = ()
     level: Annotated[float, Key(LEVEL, "Shifts the whole covariance of the position error.")] = 0.0
     source: Source = None
-    of_parts: tuple[tuple[str, str], ...] = ()
+    part_sources: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
 
     @property
@@ -208,7 +208,7 @@ class Navigation(NamedTuple):
     def evidence(self, figure: str) -> str | None:
         """Source of a figure, such as `imu.gyro_bias`; None if no source is stated."""
         section: AidedImu | AidedGnss = getattr(self, figure.partition(".")[0])
-        return dict(self.of_parts).get(figure) or section.source or self.source
+        return dict(self.part_sources).get(figure) or section.source or self.source
 
     @property
     def sources(self) -> tuple[str, ...]:

@@ -608,15 +608,15 @@ def _with_aiding_parts(
 
     Figures that come from parts are appended to `taken`. A figure that the file states replaces that of a part.
     """
-    overridden, of_parts, is_valid = [], dict[str, str](), True
-    for kind, known in (("imu", AIDED_IMU_FIGURES), ("gnss", AIDED_GNSS_FIGURES)):
+    overridden, part_sources, is_valid = [], dict[str, str](), True
+    for kind, figure_keys in (("imu", AIDED_IMU_FIGURES), ("gnss", AIDED_GNSS_FIGURES)):
         section: AidedImu | AidedGnss = getattr(navigation, kind)
         entries = _parts_of(section.sensor, (*path, kind, "sensor"), (kind,), find, report)
         if entries is INVALID:
             is_valid = False
             continue
         for name, entry in entries.items():
-            stated = [figure for figure in entry.figures if figure in known]
+            stated = [figure for figure in entry.figures if figure in figure_keys]
             figures = {figure: getattr(entry.part, figure) for figure in stated if getattr(section, figure) is None}
             overridden += [
                 Overridden(
@@ -629,7 +629,7 @@ def _with_aiding_parts(
                 if figure not in figures
             ]
             section = section._replace(**figures)
-            of_parts |= {f"{kind}.{figure}": evidence(entry.part, figure) for figure in figures}
+            part_sources |= {f"{kind}.{figure}": evidence(entry.part, figure) for figure in figures}
             taken += _taken(name, entry, (*path, kind), figures)
             for figure in missing_figures(section):
                 problem = f"is missing: {shown(entry.part.name)} states none"
@@ -641,7 +641,7 @@ def _with_aiding_parts(
             navigation = navigation._replace(gnss=section)
     if not is_valid:
         return INVALID
-    return navigation._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+    return navigation._replace(part_sources=tuple(part_sources.items()), overridden=tuple(overridden))
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:

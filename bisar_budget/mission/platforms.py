@@ -624,7 +624,7 @@ class Platform(NamedTuple):
                 yield Problem(str(undefined), "accepted: scene", at=("motion_error", "frame"))
 
     @property
-    def parts(self) -> dict[str, str]:
+    def part_names(self) -> dict[str, str]:
         """Map each key below the platform that names a part of the catalogue to the name of the part."""
         names = {"motion_error.sensor": self.motion_error.sensor}
         if isinstance(self.motion_error.sensor, tuple):

@@ -40,7 +40,7 @@ from bisar_budget.navigation.error_state import (
 )
 from bisar_budget.navigation.timeline import Timeline
 
-_NO_FIX_VARIANCE = 1e30  # of a fix that is not taken, in m² or m²/s²
+_NO_FIX_SIGMA_M = 1e15  # of a fix that is not taken; for a velocity in m/s
 _STEP_MATRICES_BYTES = 64e6  # memory of the matrices of the steps of cases that are analysed together
 
 
@@ -301,7 +301,7 @@ def _measurement(fixes: Fixes) -> tuple[Floats, Floats]:
     if fixes.state_size > FIX_WANDER.start:
         measured[:3, FIX_WANDER] = np.eye(3)
     variances = np.square(np.concatenate((fixes.position_m, fixes.velocity_mps), axis=1))
-    return measured, np.minimum(variances, _NO_FIX_VARIANCE)
+    return measured, np.minimum(variances, _NO_FIX_SIGMA_M**2)
 
 
 def _start_covariance(start: StartSigmas, unit: InertialUnit, fixes: Fixes) -> Floats:
@@ -321,7 +321,7 @@ def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Booleans)
 
     Cases in which `is_taken` is false take a fix without information.
     """
-    R = np.where(is_taken[:, None], variances, _NO_FIX_VARIANCE)
+    R = np.where(is_taken[:, None], variances, _NO_FIX_SIGMA_M**2)
     seen = measured @ P
     S = seen @ measured.T
     S[:, range(6), range(6)] += R

@@ -303,4 +303,4 @@ def _sensors(mission: Mission, row: Row) -> set[str]:
     if row.owner not in PLATFORMS:
         return set()
     platform: Platform = getattr(mission.platforms, row.owner)
-    return {plain_file(name) for name in platform.parts.values()}
+    return {plain_file(name) for name in platform.part_names.values()}
