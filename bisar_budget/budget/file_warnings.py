@@ -17,6 +17,7 @@ from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
 from bisar_budget.budget.judged_requirements import negligible_rad, required_keys
+from bisar_budget.budget.navigation_warnings import navigation_warnings
 from bisar_budget.constants import (
     EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2,
     EARTH_RADIUS_M,
@@ -73,6 +74,7 @@ def file_warnings(
         *_doubtful_paths(mission),
         *_noisy_fits(mission),
         *_of_instruments(case),
+        *(_Warned(*warning) for warning in navigation_warnings(case)),
         *_of_lever_arms(mission),
         *_of_calm_oscillators(mission),
         *_of_doubted_noise(mission, rows),

@@ -507,13 +507,12 @@ def _navigation_wording(mission: Mission, error: RandomError) -> _Wording:
     return (
         "aided navigation",
         "; ".join(navigation.sources) or None,
-        tuple(_navigation_notes(mission, error, navigation)),
+        tuple(_navigation_notes(error, navigation)),
     )
 
 
-def _navigation_notes(mission: Mission, error: RandomError, navigation: Navigation) -> Iterator[Note]:
+def _navigation_notes(error: RandomError, navigation: Navigation) -> Iterator[Note]:
     """Yield notes on the assumptions behind the covariance of an aided navigation."""
-    half, errors = mission.collection.aperture_time / 2, error.navigation
     if navigation.is_smoothed:
         yield phrases.note("navigation-is-smoothed", before=navigation.before, after=navigation.after_s)
     else:
@@ -522,12 +521,6 @@ def _navigation_notes(mission: Mission, error: RandomError, navigation: Navigati
         yield phrases.note("gnss-errors-are-white")
     if navigation.level:
         yield phrases.note("navigation-is-shifted", level_db=navigation.level)
-    if errors is not None and not errors.has_fixes:
-        yield phrases.note("navigation-has-no-fix", start=-half - navigation.before, end=half + navigation.after_s)
-    elif errors is not None:
-        share, quantity = errors.remaining_start
-        if share > _CONVERGED_FRACTION:
-            yield phrases.note("navigation-has-not-converged", share=share, quantity=quantity)
     yield from override_notes(error.owner, navigation.overridden)
 
 

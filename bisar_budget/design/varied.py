@@ -31,6 +31,7 @@ from bisar_budget.mission.model import (
     least_age,
     least_bandwidth,
 )
+from bisar_budget.mission.navigation import MAX_FIX_COUNT
 from bisar_budget.mission.platforms import (
     MAX_TRAVEL_RATIO,
     MIN_BASELINE_M,
@@ -180,6 +181,9 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
                 is_safe &= (slope * SAFETY_FACTOR > -MAX_FALL_DB_PER_DECADE) & (
                     slope * SAFETY_FACTOR < MAX_RISE_DB_PER_DECADE
                 )
+        navigation = platform.motion_error.navigation
+        if navigation is not None:
+            is_safe &= np.asarray(navigation.fix_count(mission.collection.aperture_time)) <= MAX_FIX_COUNT
         covariance = platform.motion_error.covariance
         if covariance is not None:
             rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]

@@ -16,6 +16,7 @@ from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, S
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
+from bisar_budget.mission.navigation import MAX_FIX_COUNT
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
@@ -349,6 +350,23 @@ def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
             )
 
 
+def _too_many_fixes(values: SectionValues) -> Iterator[Problem]:
+    """Yield a problem for each aided navigation with more fixes than a check has time and memory for."""
+    platforms, collection = values.get("platforms"), values.get("collection")
+    if platforms is None or collection is None:
+        return
+    for name, platform in platforms._asdict().items():
+        navigation = platform.motion_error.navigation
+        count = 0.0 if navigation is None else navigation.fix_count(collection.aperture_time)
+        if navigation is not None and count > MAX_FIX_COUNT:
+            yield Problem(
+                f"makes {count:.3g} fixes from the start of the flight to its end",
+                f"accepted: at most {MAX_FIX_COUNT}; a shorter before and after, or a rate of "
+                f"{navigation.gnss.rate * MAX_FIX_COUNT / count:.2g} Hz",
+                at=("platforms", name, "motion_error", "navigation", "gnss", "rate"),
+            )
+
+
 SHARE_SUM_TOLERANCE_FRACTION = 1e-6  # largest difference of a sum of shares from 1
 
 
@@ -631,6 +649,7 @@ class Mission(NamedTuple):
             )
         yield from _unset_clocks(values)
         yield from _noise_cut_off(values)
+        yield from _too_many_fixes(values)
         names, row_ids = set[str](), set[str]()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in names or not row_ids.isdisjoint(other.stated):

@@ -42,6 +42,7 @@ from bisar_budget.mission.vibrations import LEVEL
 SMOOTHED_METHOD, FILTERED_METHOD = "smoothed", "filtered"
 DEFAULT_FLIGHT_S = 60.0  # of the flight before and after the aperture
 DEFAULT_HEADING_RAD = math.radians(5)
+MAX_FIX_COUNT = 20_000  # of a flight; a check takes 0.1 ms and 10 kB for each
 _FLIGHT_TIME = Quantity(units.TIME, ge=0, le=1e5)
 _OUTAGE_TIME = Quantity(units.TIME, ge=-1e6, le=1e6)
 
@@ -151,8 +152,8 @@ class _OutageReader(Reader[Outage]):
 class Navigation(NamedTuple):
     """An inertial unit that a GNSS receiver aids: its errors are those that a filter or a smoother leaves.
 
-    `part_sources` has the names of the figures that come from parts of the catalogue, each with its source. `overridden`
-    lists the figures of parts that keys of the file replace.
+    `part_sources` has the names of the figures that come from parts of the catalogue, each with its source.
+    `overridden` lists the figures of parts that keys of the file replace.
     """
 
     imu: Annotated[AidedImu, Key(Section(AidedImu), "The inertial unit.")]
@@ -197,6 +198,10 @@ class Navigation(NamedTuple):
         if not self.is_smoothed:
             return 0.0
         return DEFAULT_FLIGHT_S if self.after is None else self.after
+
+    def fix_count(self, aperture_time: PerCase) -> PerCase:
+        """Number of fixes during the flight, without outages, for an aperture time in s."""
+        return 1 + (self.before + aperture_time + self.after_s) * self.gnss.rate
 
     @property
     def figures(self) -> Mapping[str, Vector]:

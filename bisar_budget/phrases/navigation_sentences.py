@@ -8,10 +8,26 @@ NAVIGATION_SENTENCES: dict[str, str] = {
     ),
     "navigation-is-shifted": "its covariance is shifted by {level_db:g} dB",
     "navigation-has-no-fix": (
-        "no fix from {start:s} to {end:s}: the inertial unit runs free from an error of 10 m, 1 m/s and 1°"
+        "platforms.{platform}.motion_error.navigation: no fix from {start:s} to {end:s}: the inertial unit runs free "
+        "from an error of 10 m, 1 m/s and 1°"
     ),
     "navigation-has-not-converged": (
-        "the filter has not converged: at mid-aperture {share:percent .0f} of its error of {quantity} at the start "
-        "remains; more flight before or after the aperture, or more fixes, would tell"
+        "platforms.{platform}.motion_error.navigation: the filter has not converged: at mid-aperture "
+        "{share:percent .0f} of the {quantity} error assumed at the start remains; add flight before or after the "
+        "aperture, or fixes"
+    ),
+    "sensor-runs-free": (
+        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make a "
+        "QPE of {free:rad}; if GNSS aids the sensor, use navigation"
+    ),
+    "sensor-runs-free-not-aided": (
+        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make a "
+        "QPE of {free:rad}; aided by the GNSS receiver, with {rate:g} fix a second and smoothed, they leave "
+        "{aided:rad}: use navigation"
+    ),
+    "position-and-velocity-contradict": (
+        "platforms.{platform}.motion_error: a position sigma of {position:m} and a velocity sigma of {velocity:m/s}, "
+        "which makes {way:m} in {half:s}, half an aperture, cannot both hold at every moment: one of them is that of "
+        "single fixes; use navigation"
     ),
 }
