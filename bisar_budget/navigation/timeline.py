@@ -68,9 +68,7 @@ class FixSchedule:
         if self.is_smoothed and inner.size > _MOST_SMOOTHED_PIECE_COUNT:
             edges = np.linspace(-self.half_s, self.half_s, _MOST_SMOOTHED_PIECE_COUNT + 1)
         else:
-            edges = _distinct(
-                np.concatenate((fewest if inner.size < _FEWEST_PIECE_COUNT else fewest[[0, -1]], inner))
-            )
+            edges = _distinct(np.concatenate((fewest, inner)))
         abscissas, weights = np.polynomial.legendre.leggauss(_PIECE_NODE_COUNT)
         middles, halves = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
         times = middles[:, None] + halves[:, None] * abscissas
