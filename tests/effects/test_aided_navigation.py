@@ -389,7 +389,7 @@ def test_covariance_is_that_of_a_dense_batch(is_smoothed: bool, wander_s: float)
     timeline, rng = timeline_of([schedule]), np.random.default_rng(1)
     count = len(timeline.steps)
     body = np.array([np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(count)])[:, None]
-    force = [*rng.standard_normal((count, 1, 3)), 0.0, 0.0, 9.8]
+    force = rng.standard_normal((count, 1, 3)) + np.array([0.0, 0.0, 9.8])
     arm = rng.standard_normal((count + 1, 1, 3))
     flight = FlightSteps(body=body, force=force, arm=arm)
     unit = InertialUnit(
