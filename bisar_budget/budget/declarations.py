@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.navigation_errors import INERTIAL_FIGURES
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.error_kinds import registered_names
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
+from bisar_budget.error_kinds.registry import registered_names
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.mission.model import Mission
@@ -47,7 +47,7 @@ def swings_nothing(platform: Platform) -> bool:
     if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
         return False
     return imu is None or all(
-        getattr(imu, figure.name) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
+        getattr(imu, figure.key) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
     )
 
 

@@ -12,7 +12,7 @@ from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.error_kinds import STATE_KINDS
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.geometry import norm
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.instruments import Oscillator

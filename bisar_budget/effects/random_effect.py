@@ -28,7 +28,7 @@ from bisar_budget.effects.range_processes import (
 )
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for

@@ -28,7 +28,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.error_kinds import SourceKind, StateKind
+from bisar_budget.error_kinds.kind import SourceKind
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
 from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
-from bisar_budget.error_kinds import motion_kind
+from bisar_budget.error_kinds.registry import motion_kind
 from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject

@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds import StateKind, SumKind, names_of_named_kinds
+from bisar_budget.error_kinds.kind import SumKind
+from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.registry import names_of_named_kinds
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement

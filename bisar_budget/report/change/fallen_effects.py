@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds import SourceKind, StateKind, SumKind
+from bisar_budget.error_kinds.kind import SourceKind, SumKind
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import SPECIFICATION, Row

@@ -12,7 +12,7 @@ import numpy as np
 
 from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.catalogue import EQUATIONS
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings

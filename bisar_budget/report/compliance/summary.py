@@ -6,8 +6,8 @@ from shlex import quote
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.effects.effect import MOTION_UNITS
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.kind import SourceKind
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -534,7 +534,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     yield "Declared", f"for position, velocity, acceleration and clock {factor}"
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
-        if any(error.stated(kind) for kind in MOTION_UNITS):
+        if any(error.stated(kind.name) for kind in STATE_KINDS):
             text = _DISTRIBUTION_WORDS[error.distribution]
             text += ", position and velocity by their covariance" if error.covariance is not None else ""
             yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {text}"

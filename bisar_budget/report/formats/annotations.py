@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.error_kinds import SumKind
+from bisar_budget.error_kinds.kind import SumKind
 from bisar_budget.faults import Fault, Place, Region, changes_words, printable, sentences
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement

@@ -5,7 +5,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.error_kinds import SumKind
+from bisar_budget.error_kinds.kind import SumKind
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
