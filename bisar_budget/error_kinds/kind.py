@@ -17,7 +17,7 @@ _OWNER_WORDS = {"clock": "timing"}  # owners that have another name in row ids
 
 # What a declared size means: one sigma of a normal distribution; the largest magnitude; what the key `distribution`
 # beside the size says; the amplitude of a sinusoid; a level in decibels relative to the declared spectrum.
-NORMAL, BOUND, AS_STATED, SINUSOID, RELATIVE_LEVEL = "normal", "bound", "as stated", "sinusoid", "level"
+NORMAL, BOUND, AS_STATED, PEAK_AMPLITUDE, RELATIVE_LEVEL = "normal", "bound", "as stated", "amplitude", "level"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,7 +112,7 @@ class ErrorSize:
         Key of the size below the key or section of its kind (`SourceKind.key_form`), with the fields `{axis}` and
         `{index}`. It is empty if the key of the kind is that of the size.
     distribution : str
-        What the size means: `NORMAL`, `BOUND`, `AS_STATED`, `SINUSOID` or `RELATIVE_LEVEL`.
+        What the size means: `NORMAL`, `BOUND`, `AS_STATED`, `PEAK_AMPLITUDE` or `RELATIVE_LEVEL`.
     equation : str
         Source of the effect of the error, such as an equation of the paper; for reports.
     has_axes : bool

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bisar_budget import units
-from bisar_budget.error_kinds.kind import BOUND, RELATIVE_LEVEL, SINUSOID, ErrorSize, SourceKind
+from bisar_budget.error_kinds.kind import BOUND, PEAK_AMPLITUDE, RELATIVE_LEVEL, ErrorSize, SourceKind
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +91,7 @@ VIBRATION_KIND = SourceKind(
         "sinusoidal": ErrorSize(
             dimension=units.LENGTH,
             key="sinusoidal.{index}.amplitude",
-            distribution=SINUSOID,
+            distribution=PEAK_AMPLITUDE,
             equation="Section V, sinusoidal",
         ),
         "wideband": ErrorSize(dimension=units.LENGTH, key="wideband.rms", equation="Section V, wideband"),
