@@ -217,7 +217,7 @@ def _cause(source: ErrorSource) -> Note:
     """Name the effect of an error that the full model takes into account and the published model does not."""
     if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
-    if source.unit == "m":
+    if source.kind.order == 0:
         return phrases.note("position-defocuses")
     if not source.is_position:
         return phrases.note("displacement-defocuses")

@@ -183,6 +183,11 @@ class RandomError(NamedTuple):
         return self.subject.source_kind
 
     @property
+    def equation(self) -> str:
+        """Source of the effect of the error, for reports."""
+        return self.kind.size(self.subject.axis).equation
+
+    @property
     def is_covered(self) -> bool:
         """Whether the declared size or its effect includes the coverage factor.
 
