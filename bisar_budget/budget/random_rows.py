@@ -47,7 +47,7 @@ from bisar_budget.effects.oscillators import POOR_FIT_FRACTION
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
 from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
-from bisar_budget.error_kinds.random_kinds import OTHER_KIND
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND, VIBRATION_KIND
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import OSCILLATOR_NOISE_FORMS, Oscillator, Synchronization
@@ -247,10 +247,9 @@ class RandomRows:
         variance = np.array(
             [phase.sum(axis=0, where=has_phase) for phase, has_phase in zip(powers, has_variance, strict=True)]
         )
-        stated = {phase.subject.id for phase in stated_powers(mission)}
-        is_held_by_shares = [
-            phase.row_id.endswith("vibration.wideband") or phase.row_id in stated for phase in members[-1]
-        ]
+        apart = {phase.subject.id for phase in stated_powers(mission)}
+        apart |= {subject(name, VIBRATION_KIND.name, "wideband").id for name in PLATFORMS}
+        is_held_by_shares = [phase.row_id in apart for phase in members[-1]]
         is_there = np.array([has_variance[-1][~np.array(is_held_by_shares, dtype=bool)].any(axis=0)] * len(owners))
         # The rows of vibration apply the shares themselves, and a stated ISLR has no share.
         is_there[-1] = True
@@ -520,7 +519,7 @@ def _uncertainty_wording(mission: Mission, error: RandomError) -> _Wording:
 def _sensor_wording(mission: Mission, error: RandomError) -> _Wording:
     figure = error.subject.axis
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
-    is_of_imu = motion.imu is not None and motion.key_of(figure) == figure
+    is_of_imu = motion.imu is not None and not motion.is_of_part(figure)
     source = motion.imu.source if motion.imu and is_of_imu else None
     notes = override_notes(error.owner, motion.overridden, figure)
     if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row

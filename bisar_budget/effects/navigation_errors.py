@@ -143,7 +143,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     force = seen.vector(specific_force(seen.mission, state))
     for index, figure in enumerate(INERTIAL_FIGURES.values()):
         values, path = getattr(error.imu, figure.key), IMU_KIND.path(name, figure.key)
-        if error.key_of(figure.key) != figure.key:
+        if error.is_of_part(figure.key):
             path = _path_of_sensor(name)
         declared, about = None, axes
         directions = acceleration_errors(figure, axes, force)
@@ -322,8 +322,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(attitude))
             declared, axes = declared * seen.factor, axes * sizes[:, None]
         published, full = seen.of_motion(platform_index, swung(axes, arm_at(state, lever.arm, times)))
-        is_of_sensor = error.key_of("attitude") != "attitude"
-        path = _path_of_sensor(name) if is_of_sensor else IMU_KIND.path(name, "attitude")
+        path = _path_of_sensor(name) if error.is_of_part("attitude") else IMU_KIND.path(name, "attitude")
         row_subject, unit = subject(name, LEVER_ARM_KIND.name, "attitude"), LEVER_ARM_KIND.size("attitude").unit
         counted = subject(name, IMU_KIND.name, "attitude").id
         yield RandomError(row_subject, unit, declared, path, published, full, spreads=False, counted_in=counted)
@@ -448,9 +447,8 @@ def _legendre(abscissas: Floats, count: int) -> Floats:
 def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield an error for each process of correlated noise that the file states for a platform's position."""
     error, kind = seen.error(name), RANDOM_KIND
-    is_of_sensor = error.key_of(kind.name) != kind.name
     for index, process in enumerate(error.random):
-        path = _path_of_sensor(name) if is_of_sensor else kind.path(name, index=index)
+        path = _path_of_sensor(name) if error.is_of_part(kind.name) else kind.path(name, index=index)
         yield _noise(seen, _Process.of(process, name), {name: seen.axes(name)}, path)
 
 

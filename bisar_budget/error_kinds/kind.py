@@ -45,6 +45,21 @@ class ErrorKind:
     spectrum_axis : str, optional
         Axis of the row about a declared spectrum, whose levels in decibels are relative to that spectrum; None if the
         kind has no such row.
+    is_source : bool
+        Whether the row is that of an error source.
+    is_sum : bool
+        Whether the row sums the effects of errors.
+    is_phase : bool
+        Whether the row of a sum has a phase in radians.
+    is_level : bool
+        Whether the row of a sum has the power of sidelobes in decibels.
+    moves : str
+        What an error source affects: the path of a `platform`, a `clock`, the delay in the `air`, or the `image`
+        itself if the file states only the effect of the error. Empty for a sum.
+    is_of_log : bool
+        Whether the error is the noise of a log of a flight, whose file is the source of the error.
+    owes_source : bool
+        Whether reports list a declared error of the kind if the file states no source for it.
     """
 
     name: str
@@ -55,6 +70,13 @@ class ErrorKind:
     only_warns: bool = False
     is_by_rule: bool = False
     is_vibration: bool = False
+    is_source: bool = False
+    is_sum: bool = False
+    is_phase: bool = False
+    is_level: bool = False
+    moves: str = ""
+    is_of_log: bool = False
+    owes_source: bool = False
 
     def row_id(self, owner: str, axis: str = "", entry: int | None = None) -> str:
         """Id of the row of an error of this kind, in the form that the contract defines."""
@@ -83,21 +105,7 @@ class ErrorKind:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SumKind(ErrorKind):
-    """A kind of row that is computed from other rows: a sum of errors, or an effect of all errors on the image.
-
-    Attributes
-    ----------
-    is_sum : bool
-        Whether the row sums the effects of errors.
-    is_phase : bool
-        Whether the row has a phase in radians.
-    is_level : bool
-        Whether the row has the power of sidelobes in decibels.
-    """
-
-    is_sum: bool = False
-    is_phase: bool = False
-    is_level: bool = False
+    """A kind of row that is computed from other rows: a sum of errors, or an effect of all errors on the image."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -142,9 +150,6 @@ class SourceKind(ErrorKind):
     ----------
     description : str
         What the error is, in one sentence.
-    moves : str
-        What the error affects: the path of a `platform`, a `clock`, the delay in the `air`, or the `image` itself if
-        the file states only the effect of the error.
     key_form : str
         Path of the key or section in the mission file that states the errors of the kind, with the fields `{owner}`
         and `{kind}`.
@@ -173,10 +178,6 @@ class SourceKind(ErrorKind):
         Whether the error is correlated noise of a position.
     has_names : bool
         Whether a file may state several errors of the kind, each with a name.
-    is_of_log : bool
-        Whether the error is the noise of a log of a flight, whose file is the source of the error.
-    owes_source : bool
-        Whether reports list a declared error of the kind if the file states no source for it.
     is_largest_of_axes : bool
         Whether the declared size is described as the largest of three axes.
     direction : str
@@ -184,7 +185,7 @@ class SourceKind(ErrorKind):
     """
 
     description: str
-    moves: str
+    is_source: bool = True
     key_form: str
     common_key_form: str = ""
     sizes: Mapping[str, ErrorSize]
@@ -197,7 +198,6 @@ class SourceKind(ErrorKind):
     is_random: bool = False
     is_correlated: bool = False
     has_names: bool = False
-    is_of_log: bool = False
     owes_source: bool = True
     is_largest_of_axes: bool = False
     direction: str = ""

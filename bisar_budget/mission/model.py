@@ -16,7 +16,7 @@ from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, S
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
-from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
+from bisar_budget.mission.platforms import FLOWN_SECTIONS, INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
     COORDINATE,
@@ -747,7 +747,7 @@ def names_files(root: Mapping[str, object]) -> bool:
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return names_requirements(root) or any(
-        key in ("orbit", "trajectory") or (isinstance(item, dict) and "sensor" in item)
+        key in FLOWN_SECTIONS or (isinstance(item, dict) and "sensor" in item)
         for section in sections
         if isinstance(section, dict)
         for key, item in section.items()

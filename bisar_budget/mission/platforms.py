@@ -91,6 +91,7 @@ _FINE_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # Copies of `paths.path_formats`, whose import would load all readers in every check.
+FLOWN_SECTIONS = ("orbit", "trajectory")  # of a platform: they take its path from a file
 SMOOTHED, RAW = "smoothed", "raw"  # path that a processor uses: the log smoothed, or its raw fixes
 _LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PART_REFERENCES = either(list, TextList(), Reference())
@@ -163,7 +164,7 @@ class MotionError(NamedTuple):
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
-        replaced = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
+        replaced = [kind for kind in MOTION_KINDS if values.get(kind) is not None]
         if replaced:
             yield Problem(f"replaces position and velocity, but there is also a {replaced[0]}", at=("covariance",))
         if values.get("distribution", "normal") != "normal":
@@ -188,9 +189,13 @@ class MotionError(NamedTuple):
         """
         return dict(self.of_parts).get(figure, self.source)
 
+    def is_of_part(self, figure: str) -> bool:
+        """Whether a figure comes from a part of the catalogue or from the source of the path, not from a key."""
+        return figure in dict(self.of_parts)
+
     def key_of(self, figure: str) -> str:
         """Key under which the file states a figure; `sensor` if the figure does not come from the file itself."""
-        return "sensor" if figure in dict(self.of_parts) else figure
+        return "sensor" if self.is_of_part(figure) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
@@ -621,7 +626,7 @@ class Platform(NamedTuple):
 
         Such a path depends on a file or on the position of the scene on the Earth.
         """
-        return self.way in ("orbit", "trajectory", "latitude")
+        return self.way in (*FLOWN_SECTIONS, "latitude")
 
     @property
     def state(self) -> PlatformState:

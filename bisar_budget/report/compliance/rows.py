@@ -263,9 +263,7 @@ class Contribution:
     @property
     def kind(self) -> SourceKind:
         """The kind of the error."""
-        kind = self.subject.facts
-        assert isinstance(kind, SourceKind)
-        return kind
+        return self.subject.source_kind
 
     @property
     def owner(self) -> str:

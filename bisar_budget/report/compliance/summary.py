@@ -6,7 +6,6 @@ from shlex import quote
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -586,9 +585,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "there are no free electrons; above, the leg crosses spherical shells at 7 km and 350 km",
         )
     for row in findings.rows:
-        kind = row.subject.facts
-        is_of_clock = isinstance(kind, SourceKind) and kind.moves == "clock"
-        if is_of_clock and row.owner in Platforms._fields and row.remarks:
+        if row.subject.facts.moves == "clock" and row.owner in Platforms._fields and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 
