@@ -322,7 +322,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(attitude))
             declared, axes = declared * seen.factor, axes * sizes[:, None]
         published, full = seen.of_motion(platform_index, swung(axes, arm_at(state, lever.arm, times)))
-        path = _path_of_sensor(name) if error.is_of_part("attitude") else IMU_KIND.path(name, "attitude")
+        path = _path_of_sensor(name) if error.is_of_part("attitude") else LEVER_ARM_KIND.path(name, "attitude")
         row_subject, unit = subject(name, LEVER_ARM_KIND.name, "attitude"), LEVER_ARM_KIND.size("attitude").unit
         counted = subject(name, IMU_KIND.name, "attitude").id
         yield RandomError(row_subject, unit, declared, path, published, full, spreads=False, counted_in=counted)

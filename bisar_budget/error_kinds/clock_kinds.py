@@ -100,14 +100,15 @@ TIMING_KIND = ClockKind(
 )
 TIME_KIND = ClockKind(
     name="time",
-    description="Time error between the clocks after they were set.",
+    description="Time error between the clocks after setting, 1 sigma; direct_path: the difference of the channels' "
+    "delays.",
     key_form="synchronization.time_error",
     owes_source=False,
     sizes={"": ClockSize(order=0, dimension=units.TIME, equation=_FIRST_ROW, symbol="x", formulas=("x",))},
 )
 FREQUENCY_KIND = ClockKind(
     name="frequency",
-    description="Error of the fractional frequency between the clocks after they were set.",
+    description="Error of the fractional frequency after setting, 1 sigma.",
     key_form="synchronization.frequency_error",
     owes_source=False,
     sizes={

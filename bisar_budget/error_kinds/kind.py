@@ -119,6 +119,8 @@ class ErrorSize:
     key : str
         Key of the size below the key or section of its kind (`SourceKind.key_form`), with the fields `{axis}` and
         `{index}`. It is empty if the key of the kind is that of the size.
+    section_form : str
+        Form of the path of the section that has the key, if it is not that of the kind.
     distribution : str
         What the size means: `NORMAL`, `BOUND`, `AS_STATED`, `PEAK_AMPLITUDE` or `RELATIVE_LEVEL`.
     equation : str
@@ -131,6 +133,7 @@ class ErrorSize:
 
     dimension: units.Dimension
     key: str = ""
+    section_form: str = ""
     distribution: str = NORMAL
     equation: str
     has_axes: bool = False
@@ -211,10 +214,12 @@ class SourceKind(ErrorKind):
         """Unit in SI of the size that all axes of the kind share."""
         return self.size().unit
 
-    def section(self, owner: str) -> KeyPath:
-        """Path of the key or section of the mission file that states the errors of an owner."""
-        key_form = self.common_key_form if self.common_key_form and owner == "mission" else self.key_form
-        return tuple(key_form.format(owner=owner, kind=self.name).split("."))
+    def section(self, owner: str, axis: str = "") -> KeyPath:
+        """Path of the key or section of the mission file that states errors of an owner, of one axis or of any."""
+        form = self.common_key_form if self.common_key_form and owner == "mission" else self.key_form
+        if axis in self.sizes:
+            form = self.sizes[axis].section_form or form
+        return tuple(form.format(owner=owner, kind=self.name).split("."))
 
     def path(self, owner: str, axis: str = "", index: int | None = None) -> KeyPath:
         """Path of the size of an error in the mission file.
@@ -227,7 +232,7 @@ class SourceKind(ErrorKind):
             if key == "{index}" and index is None:
                 break
             keys.append(index if key == "{index}" and index is not None else key.format(axis=axis))
-        return (*self.section(owner), *keys)
+        return (*self.section(owner, axis), *keys)
 
     @property
     def is_shared(self) -> bool:

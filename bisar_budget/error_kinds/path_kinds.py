@@ -164,7 +164,7 @@ def _of_state(dimension: units.Dimension, equation: str) -> Mapping[str, ErrorSi
 
 POSITION_KIND = StateKind(
     name="position",
-    description="Constant error of a measured position.",
+    description="Constant error of the measured position.",
     order=0,
     symbol="p\u0303",
     flown_as="position",
@@ -172,7 +172,7 @@ POSITION_KIND = StateKind(
 )
 VELOCITY_KIND = StateKind(
     name="velocity",
-    description="Constant error of a measured velocity: a position error that grows from mid-aperture.",
+    description="Constant error of the measured velocity; its position error grows from mid-aperture.",
     order=1,
     symbol="ṽ",
     flown_as="velocity",
@@ -181,7 +181,7 @@ VELOCITY_KIND = StateKind(
 )
 ACCELERATION_KIND = StateKind(
     name="acceleration",
-    description="Constant error of a measured acceleration: a position error that grows with the square of time.",
+    description="Constant error of the measured acceleration; its position error grows with the square of time.",
     order=2,
     symbol="ã",
     flown_as="acceleration",

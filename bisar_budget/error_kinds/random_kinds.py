@@ -122,12 +122,18 @@ LEVER_ARM_KIND = SourceKind(
     is_random=True,
     sizes={
         "uncertainty": ErrorSize(dimension=units.LENGTH, key="uncertainty", equation="lever arm", has_axes=True),
-        "attitude": ErrorSize(dimension=units.ANGLE, key="attitude", equation="lever arm", has_axes=True),
+        "attitude": ErrorSize(
+            dimension=units.ANGLE,
+            key="attitude",
+            section_form=IMU_KIND.key_form.replace("{kind}", IMU_KIND.name),
+            equation="lever arm",
+            has_axes=True,
+        ),
     },
 )
 RANDOM_KIND = SourceKind(
     name="random",
-    description="Noise of a measured position, with a correlation time.",
+    description="Position errors that change within the aperture.",
     moves="platform",
     key_form="platforms.{owner}.motion_error.{kind}",
     common_key_form="common_motion_error.{kind}",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
 from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
+from bisar_budget.error_kinds.path_kinds import TERRAIN_KIND
 from bisar_budget.error_kinds.registry import motion_kind
 from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
@@ -122,9 +123,7 @@ class Scene(NamedTuple):
     height: Annotated[float | None, Key(HEIGHT, "Height of the centre above the ellipsoid.")] = None
 
     radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
-    height_error: Annotated[
-        float | None, Key(COORDINATE, "Height of the scene above the height that the processor assumes.")
-    ] = None
+    height_error: Annotated[float | None, Key(COORDINATE, TERRAIN_KIND.description)] = None
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:

@@ -13,6 +13,8 @@ import numpy as np
 from bisar_budget import units
 from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.constants import LEAST_FALLING_HEIGHT_M
+from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, POSITION_KIND, TIME_TAG_KIND, VELOCITY_KIND
+from bisar_budget.error_kinds.random_kinds import RANDOM_KIND
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
     STILL_SPEED_MPS,
@@ -112,11 +114,11 @@ class MotionError(NamedTuple):
             "cross-track.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
-        None
-    )
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
+    ] = None
     covariance: Annotated[
         Covariance | None,
         Key(
@@ -137,11 +139,11 @@ class MotionError(NamedTuple):
     imu: Annotated[Imu | None, Key(IMU, "Figures of the inertial sensor.")] = None
     random: Annotated[
         tuple[GaussMarkov, ...],
-        Key(RANDOM, "Position errors that change within the aperture."),
+        Key(RANDOM, RANDOM_KIND.description),
     ] = ()
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, "Time error of the navigation against the radar; positive: positions belong to later times."),
+        Key(TIME_TAG, TIME_TAG_KIND.description),
     ] = None
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
@@ -222,11 +224,11 @@ class CommonMotionError(NamedTuple):
             "scene: one vector, east, north, up; track, look, ric: the same components in each platform's own axes.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
-        None
-    )
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
+    ] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     random: Annotated[
         tuple[GaussMarkov, ...],

@@ -6,9 +6,16 @@ The values are written as a mission file writes them. A platform's keys are thos
 import copy
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
+import bisar_budget as bb
+from bisar_budget import units
+from bisar_budget.error_kinds import registry
+from bisar_budget.mission.changes import all_keys
 from bisar_budget.mission.model import mission_schema
 
 Document = dict[str, Any]
@@ -61,7 +68,33 @@ class ErrorKey(NamedTuple):
     instead: Any = None
 
 
+def drift_north(path: object, times: np.ndarray) -> np.ndarray:
+    """Motion of a registered kind of error: a drift to the north. [m per m/s]"""
+    return np.stack([0 * times, times, 0 * times])
+
+
+REGISTERED_KIND = bb.MotionKind(
+    name="drift_north",
+    dimension=units.SPEED,
+    description="Drift of the phase centre to the north.",
+    motion=drift_north,
+)
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """Register the kind of error of the key `registered` for a while."""
+    before = dict(registry._KINDS)
+    bb.register(REGISTERED_KIND)
+    all_keys.cache_clear()
+    yield
+    registry._KINDS.clear()
+    registry._KINDS.update(before)
+    all_keys.cache_clear()
+
+
 ERROR, COMMON = f"{RECEIVER}motion_error.", "common_motion_error."
+REGISTERED = f"{ERROR}registered.{REGISTERED_KIND.name}"
 OSCILLATOR, VIBRATION = f"{RECEIVER}oscillator.", f"{RECEIVER}motion_error.vibration."
 LIGHT = {f"{ERROR}imu.attitude": "0.1 deg"}
 RANDOM = {f"{ERROR}random.0.name": "GNSS"}
@@ -264,6 +297,7 @@ ERROR_KEYS: dict[str, ErrorKey] = {
     ),
     "other_errors.location_error": ErrorKey("5 m", "10 m", "other.antenna.location_error", ANTENNA, "other_errors"),
     "other_errors.islr": ErrorKey("-30 dB", "-20 dB", "other.antenna.islr", ANTENNA, "other_errors"),
+    REGISTERED: ErrorKey("5 cm/s", "10 cm/s", f"receiver.{REGISTERED_KIND.name}"),
 }
 
 # Keys that describe an error: which of them changes nothing that is computed is said beside it.
