@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from bisar_budget.error_kinds import MotionKind as MotionKind
-    from bisar_budget.error_kinds import register as register
+    from bisar_budget.error_kinds.registry import MotionKind as MotionKind
+    from bisar_budget.error_kinds.registry import register as register
     from bisar_budget.faults import MissionError as MissionError
     from bisar_budget.front.checks import check as check
     from bisar_budget.front.imaging import simulate as simulate
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 # Public names, by the module that defines them.
 _LIVES = {
-    "error_kinds": ("MotionKind", "register"),
+    "error_kinds.registry": ("MotionKind", "register"),
     "faults": ("MissionError",),
     "mission.model": ("Mission",),
     "mission.quantities": ("QuestionError",),

@@ -38,7 +38,7 @@ _DERIVED = "bisar_budget/theory/differential_range.py"
 _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
-_KINDS = "bisar_budget/error_kinds.py"
+_KINDS = "bisar_budget/error_kinds/kind.py"
 _POINT = "bisar_budget/simulator/point.py"
 _PIECES = "bisar_budget/effects/effect.py"
 _PHASES = "bisar_budget/verifier/phase_cases.py"
@@ -178,16 +178,16 @@ MUTANTS = (
     ),
     Mutant(
         "registry: a wrong height of the scene is flown as a time tag",
-        _KINDS,
-        'flown_as="height", is_covered=False',
-        'flown_as="time_tag", is_covered=False',
+        "bisar_budget/error_kinds/path_kinds.py",
+        'flown_as="height"',
+        'flown_as="time_tag"',
         ("tests/simulate/test_flown_errors.py::test_a_wrong_height_of_the_scene_is_flown",),
     ),
     Mutant(
         "registry: a registered kind is not flown",
         "bisar_budget/simulator/flown_errors.py",
-        "Course(times, size * motion.T)",
-        "Course(times, 0 * motion.T)",
+        "Course(times, size * np.array(",
+        "Course(times, 0 * np.array(",
         ("tests/contract/test_extending.py::test_simulate_flies_it",),
     ),
     Mutant(

@@ -33,6 +33,7 @@ from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Shares
@@ -456,7 +457,7 @@ def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Not
     """
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
-        slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
+        slow = spur.slow_parts(T) if subject(spur.name, OSCILLATOR_KIND.name).id == row_id else None
         if slow is not None and 2 * factor**2 * float(slow.cubic if is_cubic else slow.quadratic) > size**2:
             return phrases.note("spur-is-folded", frequency=spur.frequency)
     return NOTHING

@@ -8,20 +8,21 @@ acceleration sensitivity but without an acceleration.
 
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.navigation_errors import INERTIAL_FIGURES
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.error_kinds import registered_names
+from bisar_budget.error_kinds.kind import SourceKind
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES, NAVIGATION_KIND
+from bisar_budget.error_kinds.registry import kind_of, registered_names
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevation_deg
+from bisar_budget.mission.quantities import value_at
 
 DECLARATIONS = subject("mission", DECLARE)  # the row of all required declarations
 
@@ -49,7 +50,7 @@ def swings_nothing(platform: Platform) -> bool:
     if platform.motion_error.navigation is not None:
         return False
     return imu is None or all(
-        getattr(imu, figure.name) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
+        getattr(imu, figure.key) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
     )
 
 
@@ -90,9 +91,31 @@ def _whole(mission: Mission, name: str) -> str:
     return ""
 
 
+# Words of `requirements.declare` that are no kinds of error, with the path of their section.
+_SECTIONS_OF_OTHER_WORDS = {
+    "covariance": "platforms.{owner}.motion_error.covariance",
+    "common": "common_motion_error",
+}
+
+
+def _key(word: str, owner: str) -> str:
+    """Path of the key or section of the mission file that states the errors of a word of `requirements.declare`."""
+    if word in _SECTIONS_OF_OTHER_WORDS:
+        return _SECTIONS_OF_OTHER_WORDS[word].format(owner=owner)
+    kind = kind_of(word)
+    assert isinstance(kind, SourceKind)
+    return ".".join(map(str, kind.section(owner)))
+
+
+def _states(mission: Mission, key: str) -> bool:
+    """Whether a mission states the value, the list or the section at a path; an empty one does not count."""
+    value = value_at(mission, key)
+    return value is not None and (not isinstance(value, tuple) or bool(value)) and getattr(value, "is_stated", True)
+
+
 @dataclass(frozen=True)
 class _OfPlatform:
-    """A kind of error that each platform can have: its key under the platform, and tests of the mission file.
+    """A kind of error that each platform can have, with tests of the mission file.
 
     `lacks` names a missing key without which the stated error has no effect; the result is empty if nothing is
     missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
@@ -103,8 +126,6 @@ class _OfPlatform:
     Kinds with `is_in_navigation` are part of an aided navigation, which declares them.
     """
 
-    key: str
-    is_stated: Callable[[Platform], bool]
     has_source: Callable[[Platform], bool]
     lacks: Callable[[Mission, str], str] = _whole
     needs_both: bool = False
@@ -146,107 +167,45 @@ def _has_source_of_lever_arm(platform: Platform) -> bool:
 
 
 _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
-    "position": _OfPlatform(
-        "motion_error.position",
-        lambda platform: platform.motion_error.stated("position") is not None,
-        _is_sourced("position"),
-        is_owed_still=True,
-    ),
-    "velocity": _OfPlatform(
-        "motion_error.velocity",
-        lambda platform: platform.motion_error.stated("velocity") is not None,
-        _is_sourced("velocity"),
-    ),
-    "acceleration": _OfPlatform(
-        "motion_error.acceleration",
-        lambda platform: platform.motion_error.acceleration is not None,
-        _is_sourced("acceleration"),
-    ),
-    "covariance": _OfPlatform(
-        "motion_error.covariance",
-        lambda platform: platform.motion_error.covariance is not None,
-        _is_sourced("covariance"),
-        is_listed=False,
-    ),
-    "vibration": _OfPlatform(
-        "motion_error.vibration", lambda platform: platform.motion_error.vibration.is_stated, _has_own_source
-    ),
-    "imu": _OfPlatform(
-        "motion_error.imu",
-        lambda platform: (
-            platform.motion_error.navigation is not None
-            or (platform.motion_error.imu is not None and platform.motion_error.imu.is_stated)
-        ),
-        _has_source_of_imu,
-        is_in_navigation=True,
-    ),
-    "random": _OfPlatform(
-        "motion_error.random",
-        lambda platform: bool(platform.motion_error.random) or platform.motion_error.navigation is not None,
-        _has_source_of_random,
-        is_in_navigation=True,
-    ),
-    "navigation": _OfPlatform(
-        "motion_error.navigation",
-        lambda platform: platform.motion_error.navigation is not None,
-        _has_source_of_navigation,
-        is_owed=False,
-    ),
+    "position": _OfPlatform(_is_sourced("position"), is_owed_still=True),
+    "velocity": _OfPlatform(_is_sourced("velocity")),
+    "acceleration": _OfPlatform(_is_sourced("acceleration")),
+    "covariance": _OfPlatform(_is_sourced("covariance"), is_listed=False),
+    "vibration": _OfPlatform(_has_own_source),
+    "imu": _OfPlatform(_has_source_of_imu, is_in_navigation=True),
+    "random": _OfPlatform(_has_source_of_random, is_in_navigation=True),
+    "navigation": _OfPlatform(_has_source_of_navigation, is_owed=False),
     "oscillator": _OfPlatform(
-        "oscillator",
-        lambda platform: platform.oscillator is not None,
         lambda platform: platform.oscillator is not None and bool(platform.oscillator.source),
         _lacks_half_of_a_vibration,
         is_owed_still=True,
         is_clock=True,
     ),
-    "time_tag": _OfPlatform(
-        "motion_error.time_tag",
-        lambda platform: platform.motion_error.time_tag is not None,
-        _has_own_source,
-        is_owed=False,
-    ),
-    "lever_arm": _OfPlatform(
-        "motion_error.lever_arm",
-        lambda platform: platform.motion_error.lever_arm is not None,
-        _has_source_of_lever_arm,
-        _lacks_an_attitude,
-        needs_both=True,
-        is_owed=False,
-    ),
+    "time_tag": _OfPlatform(_has_own_source, is_owed=False),
+    "lever_arm": _OfPlatform(_has_source_of_lever_arm, _lacks_an_attitude, needs_both=True, is_owed=False),
 }
+_REGISTERED = _OfPlatform(_has_own_source, is_owed=False)  # no file is obliged to declare a registered kind
 
 
 def _of_platforms() -> Mapping[str, _OfPlatform]:
     """Kinds of error that a platform can have, by name, including those that other packages registered."""
-    return {**_KINDS_OF_PLATFORMS, **{name: _registered(name) for name in registered_names()}}
-
-
-@cache
-def _registered(name: str) -> _OfPlatform:
-    """Return the tests for a kind of error that another package registered; no file is obliged to declare it."""
-    return _OfPlatform(
-        f"motion_error.registered.{name}",
-        lambda platform: name in platform.motion_error.registered,
-        _has_own_source,
-        is_owed=False,
-    )
+    return {**_KINDS_OF_PLATFORMS, **dict.fromkeys(registered_names(), _REGISTERED)}
 
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error that belongs to no single platform, with functions that test for it in the mission file.
+    """A kind of error that belongs to no single platform, with tests of the mission file.
 
     Such errors are errors of the clocks and of the atmosphere, errors that both platforms have in common, and errors
     with other causes.
     """
 
     owner: str
-    is_stated: Callable[[Mission], bool]
-    has_source: Callable[[Mission], bool]
-    missing: Callable[[Mission], list[str]]  # keys that the file should have
+    has_source: Callable[[Mission], bool] = lambda mission: True
+    missing: Callable[[Mission], list[str]] | None = None  # keys that the file should have; None: the kind's own key
     is_owed: Callable[[Mission], bool] = lambda mission: False
     has_halves: bool = False  # the file may state a part of the kind
+    is_stated: Callable[[Mission], bool] | None = None  # None: the file has the kind's own key
 
 
 def _states_clock(mission: Mission) -> bool:
@@ -303,42 +262,32 @@ def _has_source_of_air(mission: Mission) -> bool:
 
 _CLOCK_KIND = "timing"
 _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
-    _CLOCK_KIND: _OfMission("clock", _states_clock, lambda mission: True, _key_of_clock, _runs_two_clocks),
-    "terrain": _OfMission(
-        "mission",
-        lambda mission: mission.scene.height_error is not None,
-        lambda mission: True,
-        lambda mission: ["scene.height_error"],
-    ),
+    _CLOCK_KIND: _OfMission("clock", missing=_key_of_clock, is_owed=_runs_two_clocks, is_stated=_states_clock),
+    "terrain": _OfMission("mission"),
     "common": _OfMission(
         "mission",
-        lambda mission: mission.common_motion_error is not None and mission.common_motion_error.is_stated,
         lambda mission: mission.common_motion_error is not None and bool(mission.common_motion_error.source),
-        lambda mission: ["common_motion_error"],
     ),
     "synchronization": _OfMission(
         "clock",
-        lambda mission: mission.synchronization is not None,
         lambda mission: mission.synchronization is not None and bool(mission.synchronization.source),
         _lacking_of_setting,
         _runs_two_clocks,
         has_halves=True,
     ),
     "propagation": _OfMission(
-        "mission",
-        lambda mission: mission.propagation is not None,
-        _has_source_of_air,
-        _legs_without_delay,
-        lambda mission: True,
-        has_halves=True,
+        "mission", _has_source_of_air, _legs_without_delay, lambda mission: True, has_halves=True
     ),
-    "other": _OfMission(
-        "mission",
-        lambda mission: bool(mission.other_errors),
-        lambda mission: all(other.source for other in mission.other_errors),
-        lambda mission: ["other_errors"],
-    ),
+    "other": _OfMission("mission", lambda mission: all(other.source for other in mission.other_errors)),
 }
+
+
+def _is_stated_of_mission(mission: Mission, kind: str) -> bool:
+    """Whether the file states a kind of error that belongs to no single platform."""
+    of_mission = _KINDS_OF_MISSION[kind]
+    if of_mission.is_stated is not None:
+        return of_mission.is_stated(mission)
+    return _states(mission, _key(kind, of_mission.owner))
 
 
 # ---------------------------------------------------------------------- declarations of a mission
@@ -357,7 +306,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
                 continue
             if of_platform.is_in_navigation and platform.motion_error.navigation is not None:
                 continue
-            is_stated = of_platform.is_stated(platform)
+            is_stated = _states(mission, _key(kind, name))
             if is_stated and not (of_platform.needs_both and of_platform.lacks(mission, name)):
                 declared.append(f"{name}.{kind}")
                 if not of_platform.has_source(platform):
@@ -365,7 +314,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
             elif is_stated or (of_platform.is_owed and (name not in still or of_platform.is_owed_still)):
                 missing.append(f"{name}.{kind}")
     for kind, of_mission in _KINDS_OF_MISSION.items():
-        if of_mission.is_stated(mission):
+        if _is_stated_of_mission(mission, kind):
             declared.append(kind)
             if not of_mission.has_source(mission):
                 without_source.append(kind)
@@ -434,8 +383,10 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
         owner, dot, kind = asked.rpartition(".")
         of_mission = _KINDS_OF_MISSION.get(kind)
         if of_mission is not None:
-            if of_mission.has_halves or not of_mission.is_stated(mission):
-                yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
+            if of_mission.has_halves or not _is_stated_of_mission(mission, kind):
+                own_key = [_key(kind, of_mission.owner)]
+                keys = own_key if of_mission.missing is None else of_mission.missing(mission)
+                yield from (Missing(of_mission.owner, kind, key) for key in keys)
             continue
         of_platform = _of_platforms()[kind]
         for name in (owner,) if dot else PLATFORMS:
@@ -443,8 +394,9 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
             is_owed_still = of_platform.is_owed_still and (bool(dot) or not of_platform.is_clock)
             if name in still and not is_owed_still:
                 continue
-            key = f"platforms.{name}.{of_platform.key}"
-            if not of_platform.is_stated(getattr(mission.platforms, name)):
+            key = _key(kind, name)
+            is_in_navigation = of_platform.is_in_navigation and _states(mission, _key(NAVIGATION_KIND.name, name))
+            if not (is_in_navigation or _states(mission, key)):
                 yield Missing(name, kind, key)
             elif lacks := of_platform.lacks(mission, name):
                 yield Missing(name, kind, key, lacks)

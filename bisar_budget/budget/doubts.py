@@ -24,7 +24,7 @@ from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import residual_subject
-from bisar_budget.error_kinds import MEASURED_KINDS, POSITION_KIND, StateKind
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, POSITION_KIND, StateKind
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, norm, unit
 from bisar_budget.mission.model import Mission

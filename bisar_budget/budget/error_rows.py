@@ -30,12 +30,14 @@ from bisar_budget.effects.declared import (
     Declared,
 )
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
+from bisar_budget.error_kinds.clock_kinds import SYNCHRONIZATION_KIND, TIMING_KIND
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import name_of_error, parts_of
 from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
 
+_CLOCK_SECTIONS = [kind.section("clock")[0] for kind in (TIMING_KIND, SYNCHRONIZATION_KIND)]
 _BINDING = np.array(
     [REQUIREMENTS.index(name) for name in (*LIMITING_REQUIREMENTS, END_OF_IMAGE)] + [-1], dtype=np.int8
 )
@@ -217,7 +219,7 @@ def _cause(source: ErrorSource) -> Note:
     """Name the effect of an error that the full model takes into account and the published model does not."""
     if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
-    if source.unit == "m":
+    if source.kind.order == 0:
         return phrases.note("position-defocuses")
     if not source.is_position:
         return phrases.note("displacement-defocuses")
@@ -277,4 +279,4 @@ def _owner(key: str) -> str:
     section, name, *_ = (*parts_of(key), "")
     if section == "platforms":
         return name if name in PLATFORMS else "mission"
-    return "clock" if section in ("timing_error", "synchronization") else "mission"
+    return "clock" if section in _CLOCK_SECTIONS else "mission"

@@ -26,6 +26,8 @@ from bisar_budget.constants import (
 )
 from bisar_budget.effects.effect import NOWHERE, PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
+from bisar_budget.error_kinds.random_kinds import LEVER_ARM_KIND
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import Row
@@ -35,8 +37,6 @@ from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.resolution import Resolution
-
-_SENSITIVITY = "acceleration_sensitivity"
 
 _MAX_GROUND_HEIGHT_M = 20e3  # of a scene, above a sphere of the Earth's mean radius
 _MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that are not geostationary
@@ -253,7 +253,7 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
     """Yield warnings about lever arms for which the file states no attitude error that would rotate them."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
-            key = ("platforms", name, "motion_error", "lever_arm", "arm")
+            key = (*LEVER_ARM_KIND.section(name), "arm")
             yield _Warned(key, phrases.note("nothing-swings-the-arm", platform=name), is_doubt=True)
 
 
@@ -262,14 +262,14 @@ def calm_oscillators(mission: Mission) -> list[str]:
     return [
         name
         for name in PLATFORMS
-        if ("platforms", name, "oscillator", _SENSITIVITY) in mission.places and is_unshaken(mission, name)
+        if OSCILLATOR_KIND.path(name, "acceleration") in mission.places and is_unshaken(mission, name)
     ]
 
 
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
     """Yield warnings about oscillators that are sensitive to acceleration but neither vibrate nor rotate."""
     for name in calm_oscillators(mission):
-        key = ("platforms", name, "oscillator", _SENSITIVITY)
+        key = OSCILLATOR_KIND.path(name, "acceleration")
         yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
 
 

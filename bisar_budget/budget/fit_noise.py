@@ -13,7 +13,7 @@ import numpy as np
 from bisar_budget.arrays import Floats
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
-from bisar_budget.error_kinds import POSITION_KIND, VELOCITY_KIND
+from bisar_budget.error_kinds.path_kinds import POSITION_KIND, VELOCITY_KIND
 from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission

@@ -46,7 +46,7 @@ class HalfCause:
         """
         if subject.id in [f"mission.{key}" for key in self.requirements]:
             return True
-        return subject.owner in self.platforms and subject.id.startswith(f"{subject.owner}.oscillator")
+        return subject.owner in self.platforms and subject.facts.moves == "clock"
 
 
 def half_causes(mission: Mission) -> Iterator[HalfCause]:

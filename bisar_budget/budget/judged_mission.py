@@ -40,7 +40,8 @@ from bisar_budget.budget.waivers import holding_place
 from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.error_kinds import SPREAD_POWER, StateKind
+from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.registry import SPREAD_POWER
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm

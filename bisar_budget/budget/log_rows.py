@@ -16,6 +16,7 @@ from bisar_budget.budget.doubts import leaves_unsaid
 from bisar_budget.budget.judged_rows import CODE, FamilyRow, Judged, Judging, Why, worded
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import residual_subject
+from bisar_budget.error_kinds.random_kinds import TRAJECTORY_KIND
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
 
@@ -46,5 +47,6 @@ class UnsaidResidual(FamilyRow):
 
     def in_words(self, case: Case, model: str) -> Row:
         """Build the report row for one case, including its text. The row is the same for both models."""
-        path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
-        return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")
+        path = TRAJECTORY_KIND.path(self.judged.subject.owner)
+        unit = TRAJECTORY_KIND.unit
+        return worded(case, self.judged, unit=unit, path=path, equation="residual of the smoothed log")

@@ -8,7 +8,6 @@ phase noise.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,6 +46,8 @@ from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import POOR_FIT_FRACTION
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND, VIBRATION_KIND
 from bisar_budget.findings.row import NavigationState, Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import OSCILLATOR_NOISE_FORMS, Oscillator, Synchronization
@@ -248,10 +249,9 @@ class RandomRows:
         variance = np.array(
             [phase.sum(axis=0, where=has_phase) for phase, has_phase in zip(powers, has_variance, strict=True)]
         )
-        stated = {phase.subject.id for phase in stated_powers(mission)}
-        is_held_by_shares = [
-            phase.row_id.endswith("vibration.wideband") or phase.row_id in stated for phase in members[-1]
-        ]
+        apart = {phase.subject.id for phase in stated_powers(mission)}
+        apart |= {subject(name, VIBRATION_KIND.name, "wideband").id for name in PLATFORMS}
+        is_held_by_shares = [phase.row_id in apart for phase in members[-1]]
         is_there = np.array([has_variance[-1][~np.array(is_held_by_shares, dtype=bool)].any(axis=0)] * len(owners))
         # The rows of vibration apply the shares themselves, and a stated ISLR has no share.
         is_there[-1] = True
@@ -349,13 +349,13 @@ class RandomRow(FamilyRow):
             doubt = _doubt(mission, error, gating, RANDOM_REQUIREMENTS[self.bound_by_other[case.place]], limit)
         elif error.continued is not None:
             doubt = _continuation(case, error, gating)
-        equation, evidence, notes = _wording(mission, error)
+        evidence, notes = _wording(mission, error)
         return worded(
             case,
             self.judged,
             unit=error.unit,
             path=error.path,
-            equation=equation,
+            equation=error.equation,
             over=over,
             doubt=doubt,
             no_limit=_unlimited(mission, error, error.effect(gating)),
@@ -443,8 +443,8 @@ class StatedRow(FamilyRow):
             case,
             row,
             unit="dB",
-            path=("other_errors", index, ISLR),
-            equation="as declared",
+            path=OTHER_KIND.path("mission", ISLR, index),
+            equation=OTHER_KIND.size(ISLR).equation,
             over=over,
             no_limit=missing,
             info=phrases.note("aggregate-decides", combine=mission.allocation.combine) if is_limited else missing,
@@ -458,7 +458,7 @@ def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
 
     The result is a Boolean or an array (cases,).
     """
-    is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
+    is_shaken = error.subject == subject(error.owner, OSCILLATOR_KIND.name, "acceleration")
     return is_shaken and lacks_a_spectrum(mission, error.owner)
 
 
@@ -474,41 +474,37 @@ def _displacement(error: RandomError, model: str) -> GroundVector | None:
     return effect.east * error.declared, effect.north * error.declared
 
 
-_Wording = tuple[str, str | None, tuple[Note, ...]]  # equation, source and notes
+_Wording = tuple[str | None, tuple[Note, ...]]  # source and notes
 
 
 def _wording(mission: Mission, error: RandomError) -> _Wording:
-    """Return the texts of the row of a random error: its equation, its source and its notes."""
+    """Return the source and the notes of the row of a random error."""
     return error.subject.facts.find_in(RANDOM_WORDINGS, error.subject.axis)(mission, error)
 
 
 def _link_wording(mission: Mission, error: RandomError) -> _Wording:
     sync = mission.synchronization
     notes = () if sync is not None and sync.interval else (phrases.note("another-for-each-pulse"),)
-    return "synchronisation", sync and sync.source, notes
+    return sync and sync.source, notes
 
 
 def _stated_wording(mission: Mission, error: RandomError) -> _Wording:
-    return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
+    return mission.other_errors[error.subject.entry or 0].source, ()
 
 
 def _vibration_wording(mission: Mission, error: RandomError) -> _Wording:
     motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
-    return "spectrum of vibration", motion_error.source, _spectrum_notes(mission, error.owner)
+    return motion_error.source, _spectrum_notes(mission, error.owner)
 
 
 def _log_wording(mission: Mission, error: RandomError) -> _Wording:
     path: FlownPath | None = getattr(mission.platforms, error.owner).path
-    return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(error.subject.axis),)
+    return path and path.source, (phrases.log_is_flown_as_it_is(error.subject.axis),)
 
 
 def _navigation_wording(mission: Mission, error: RandomError) -> _Wording:
     navigation = getattr(mission.platforms, error.owner).motion_error.navigation
-    return (
-        "aided navigation",
-        "; ".join(navigation.sources) or None,
-        tuple(_navigation_notes(error, navigation)),
-    )
+    return "; ".join(navigation.sources) or None, tuple(_navigation_notes(error, navigation))
 
 
 def _navigation_notes(error: RandomError, navigation: Navigation) -> Iterator[Note]:
@@ -529,27 +525,27 @@ def _process_wording(mission: Mission, error: RandomError) -> _Wording:
     if error.owner not in PLATFORMS:
         common = mission.common_motion_error
         note = phrases.note("held-to-the-total", owners="both platforms")
-        return "Gauss-Markov", source or (common and common.source), (note,)
+        return source or (common and common.source), (note,)
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     notes = override_notes(error.owner, motion.overridden, "random")
-    return "Gauss-Markov", source or motion.evidence("random"), notes
+    return source or motion.evidence("random"), notes
 
 
 def _uncertainty_wording(mission: Mission, error: RandomError) -> _Wording:
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     lever = motion.lever_arm
-    return "lever arm", (lever and lever.source) or motion.source, ()
+    return (lever and lever.source) or motion.source, ()
 
 
-def _sensor_wording(mission: Mission, error: RandomError, equation: str = "inertial sensor") -> _Wording:
+def _sensor_wording(mission: Mission, error: RandomError) -> _Wording:
     figure = error.subject.axis
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
-    is_of_imu = motion.imu is not None and motion.key_of(figure) == figure
+    is_of_imu = motion.imu is not None and not motion.is_of_part(figure)
     source = motion.imu.source if motion.imu and is_of_imu else None
     notes = override_notes(error.owner, motion.overridden, figure)
     if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
         notes = (phrases.note("counted-in-another-row", row_id=error.counted_in), *notes)
-    return equation, source or motion.evidence(figure), notes
+    return source or motion.evidence(figure), notes
 
 
 def _spectrum_notes(mission: Mission, name: str) -> tuple[Note, ...]:
@@ -563,12 +559,12 @@ def _spectrum_notes(mission: Mission, name: str) -> tuple[Note, ...]:
     return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *order, *seen)
 
 
-def _acceleration_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _acceleration_wording(mission: Mission, error: RandomError) -> _Wording:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
-    return "acceleration sensitivity", evidence(oscillator), notes_of_acceleration(mission, error.owner)
+    return evidence(oscillator), notes_of_acceleration(mission, error.owner)
 
 
-def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _oscillator_wording(mission: Mission, error: RandomError) -> _Wording:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
     noise, sync = error.noise, mission.synchronization
     notes = [*override_notes(error.owner, oscillator.overridden, *OSCILLATOR_NOISE_FORMS, "frequency")]
@@ -587,7 +583,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
             notes.append(phrases.note("folded-spurs-count"))
     if noise is not None and _GOOD_FIT_FRACTION < noise.misfit <= POOR_FIT_FRACTION:
         notes.append(phrases.note("power-law-fits", misfit=noise.misfit))
-    return "phase noise", oscillator.source, tuple(notes)
+    return oscillator.source, tuple(notes)
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
@@ -602,13 +598,13 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
         yield phrases.note("heard-twice", delay=float(mission.geometry.echo_delay))
 
 
-def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """Return the texts of the row of an atmospheric delay: its equation, its source and its notes."""
+def _air_wording(mission: Mission, error: RandomError) -> _Wording:
+    """Return the source and the notes of the row of an atmospheric delay."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
     if error.counted_in and error.declared is None:  # otherwise this note is the reason of the row
-        return "delay of the air", source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
+        return source, (phrases.note("counted-in-another-row", row_id=error.counted_in),)
     notes = () if error.owner in PLATFORMS else (phrases.note("held-to-the-total", owners="both legs, by one air"),)
-    return "delay of the air", source, notes
+    return source, notes
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
@@ -642,11 +638,11 @@ def _quiet(mission: Mission, error: RandomError) -> Note:
     return phrases.note("no-acceleration") if error.subject.axis else phrases.note("no-phase-noise")
 
 
-# By kind, or by kind and axis: the texts of a row, and the reason why an error has no effect.
+# By kind, or by kind and axis: the source and notes of a row, and the reason why an error has no effect.
 RANDOM_WORDINGS: Mapping[str, Callable[[Mission, RandomError], _Wording]] = {
     "vibration": _vibration_wording,
     "imu": _sensor_wording,
-    "lever_arm": partial(_sensor_wording, equation="lever arm"),
+    "lever_arm": _sensor_wording,
     "lever_arm.uncertainty": _uncertainty_wording,
     "navigation": _navigation_wording,
     "random": _process_wording,

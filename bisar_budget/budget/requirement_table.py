@@ -33,7 +33,7 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
-from bisar_budget.error_kinds import kind_of
+from bisar_budget.error_kinds.registry import kind_of
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.mission.model import id_of_requirement

@@ -25,6 +25,8 @@ from bisar_budget.effects.oscillator_acceleration import (
 )
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST_ECHO_CYCLES, cubic_part, quadratic_part
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
+from bisar_budget.error_kinds.random_kinds import VIBRATION_KIND
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
@@ -160,8 +162,8 @@ class SpurRow(FamilyRow):
             case,
             row,
             unit="dB",
-            path=("platforms", spur.name, "oscillator", "spurs"),
-            equation="first principles" if model == "full" else "Section V, sinusoidal",
+            path=OSCILLATOR_KIND.path(spur.name, row.subject.axis),
+            equation="first principles" if model == "full" else VIBRATION_KIND.size("sinusoidal").equation,
             over=over,
             doubt=doubt,
             no_limit=missing,
@@ -280,12 +282,13 @@ class AcceleratedRow(FamilyRow):
                     unit="s^2/m",
                 )
         oscillator: Oscillator = getattr(mission.platforms, tone.name).oscillator
+        size = OSCILLATOR_KIND.size(row.subject.axis)
         return worded(
             case,
             row,
-            unit="s^2/m",
-            path=("platforms", tone.name, "oscillator", SENSITIVITY),
-            equation="acceleration sensitivity" if model == "full" else "Section V, sinusoidal",
+            unit=size.unit,
+            path=OSCILLATOR_KIND.path(tone.name, row.subject.axis),
+            equation=size.equation if model == "full" else VIBRATION_KIND.size("sinusoidal").equation,
             over=over,
             doubt=doubt,
             no_limit=missing,

@@ -34,6 +34,7 @@ from bisar_budget.effects.vibration import (
     unit_of_line,
     worst_phases,
 )
+from bisar_budget.error_kinds.random_kinds import VIBRATION_KIND
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.platforms import MotionError
@@ -372,7 +373,8 @@ def _row(
     limit of the row, and `more` after them.
     """
     row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
-    equation = f"Section V, {key[0]}" if model == "published" else "first principles"
+    equation = VIBRATION_KIND.size(row_subject.axis.split(".")[0]).equation
+    equation = equation if model == "published" else "first principles"
     missing, margin = phrases.note("no-requirement-of", metric=metric), None
     if vibration_row.limits is not None:
         limits = VibrationLimits(*map(case.number, vibration_row.limits))
@@ -388,7 +390,7 @@ def _row(
         case,
         vibration_row.judged,
         unit=_unit(case, vibration_row),
-        path=("platforms", row_subject.owner, "motion_error", "vibration", *key),
+        path=(*VIBRATION_KIND.section(row_subject.owner), *key),
         equation=equation,
         over=phase_over(case, vibration_row.judged) or phrases.share_of_power_over(metric, equation),
         doubt=doubt,
@@ -441,7 +443,7 @@ def _slow_row(case: Case, vibration_row: VibrationRow, error: MotionError, model
         case,
         vibration_row.judged,
         unit=_unit(case, vibration_row),
-        path=("platforms", row_subject.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
+        path=VIBRATION_KIND.path(row_subject.owner, row_subject.axis, entry),
         equation="first principles",
         over=phase_over(case, vibration_row.judged),
         info=NOTHING if combine == "each" else phrases.note("aggregate-decides", combine=combine),

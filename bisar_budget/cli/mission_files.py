@@ -52,7 +52,7 @@ def schema(is_of_part: bool, output: str | None) -> None:
 
     The first line of a file names its schema: # yaml-language-server: $schema=mission.schema.json
     """
-    from bisar_budget.error_kinds import entry_point_faults
+    from bisar_budget.error_kinds.registry import entry_point_faults
     from bisar_budget.mission.model import mission_schema
     from bisar_budget.mission.parts import part_schema
 

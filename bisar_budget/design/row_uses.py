@@ -24,7 +24,8 @@ from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.error_kinds import ErrorKind, kind_of
+from bisar_budget.error_kinds.kind import ErrorKind
+from bisar_budget.error_kinds.registry import kind_of
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import ACCEPTED_ERRORS
 from bisar_budget.mission.model import MetricSplits, Mission

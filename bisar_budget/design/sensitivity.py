@@ -22,6 +22,7 @@ from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
 from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.error_kinds.path_kinds import TIME_TAG_KIND
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.json_types import JsonObject
@@ -564,10 +565,10 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
                 (f"{key}.imu", error.imu, [figure for figure in error.imu._fields if figure != "source"], 0)
             )
         sections.append((f"{key}.random", None, (), len(error.random)))
-        sections.append((key, error, ("time_tag",), 0))
+        sections.append((key, error, (TIME_TAG_KIND.name,), 0))
         sections.append((f"{key}.lever_arm", error.lever_arm, ("uncertainty",), 0))
     common, air = mission.common_motion_error, mission.propagation
-    sections.append(("common_motion_error", common, (*MOTION, "time_tag"), 0))
+    sections.append(("common_motion_error", common, (*MOTION, TIME_TAG_KIND.name), 0))
     sections.append(("common_motion_error.random", None, (), 0 if common is None else len(common.random)))
     sections.append(("timing_error", mission.timing_error, mission.timing_error._fields, 0))
     sections.append(("propagation", air, (*PLATFORMS, *DELAYS), 0))

@@ -12,9 +12,12 @@ from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.error_kinds import STATE_KINDS
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND, TIMING_KIND
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
+from bisar_budget.error_kinds.random_kinds import NAVIGATION_KIND
 from bisar_budget.geometry import norm
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
+from bisar_budget.mission.covariance import MOTION_KINDS
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
@@ -162,15 +165,20 @@ def usual_keys(mission: Mission) -> Iterator[str]:
         for state in STATE_KINDS[:1] if platform.state.is_still or is_aided else STATE_KINDS:
             is_fixed = error.covariance is not None and state.has_covariance
             if not is_fixed and state.name not in dict(error.of_parts):
-                yield f"platforms.{name}.motion_error.{state.name}"
+                yield ".".join(map(str, state.section(name)))
         if is_aided and not error.navigation.part_sources:
-            yield f"platforms.{name}.motion_error.navigation.level"
+            yield ".".join(map(str, NAVIGATION_KIND.path(name)))
     oscillators = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None]
     for name in oscillators:
         if getattr(mission.platforms, name).oscillator.sensor is None:
-            yield f"platforms.{name}.oscillator.level"
+            yield _level_of_oscillator(name)
     if not oscillators and not mission.has_direct_path:
-        yield "timing_error.quadratic"
+        yield ".".join(map(str, TIMING_KIND.path("clock", "quadratic")))
+
+
+def _level_of_oscillator(name: str) -> str:
+    """Key of the level of the noise of a platform's oscillator."""
+    return ".".join(map(str, OSCILLATOR_KIND.path(name)))
 
 
 def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
@@ -180,7 +188,7 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
     number = specified_number(mission, tree, key)
     error = getattr(mission.platforms, parts[1]).motion_error if parts[0] == "platforms" else None
-    if error is not None and error.covariance is not None and parts[3] in ("position", "velocity"):
+    if error is not None and error.covariance is not None and parts[3] in MOTION_KINDS:
         raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED_ERRORS}")
     return number
 
@@ -237,8 +245,9 @@ def suitable_parts(mission: Mission, specified: Specified, most: float, candidat
     inertial sensors measure nothing in free fall.
     """
     *above, section, figure = parts_of(specified.key)
-    if section == "oscillator" and figure == "level":
-        yield from _quiet_oscillators(mission, above[-1], most, candidates)
+    for name in PLATFORMS:
+        if specified.key == _level_of_oscillator(name):
+            yield from _quiet_oscillators(mission, name, most, candidates)
     kind = {"motion_error": "gnss", "gnss": "gnss", "imu": "imu"}.get(section)
     is_satellite = above[:1] == ["platforms"] and _is_satellite(getattr(mission.platforms, above[1]))
     for entry in candidates:
@@ -280,8 +289,8 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 
     The result is empty if the specified error is not the level of an oscillator.
     """
-    _, name, *below = parts_of(specified.key)
-    if below != ["oscillator", "level"]:
+    name = parts_of(specified.key)[1]
+    if specified.key != _level_of_oscillator(name):
         return ""
     carrier, pieces = _spectrum(mission, name)
     levels = zip(_OFFSETS_HZ, density(pieces, np.array(_OFFSETS_HZ)).tolist(), strict=True)

@@ -15,10 +15,18 @@ from numpy.typing import NDArray
 from bisar_budget import units
 from bisar_budget.arrays import PerCase, PerCaseFlag
 from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.error_kinds.path_kinds import TIME_TAG_KIND
+from bisar_budget.error_kinds.random_kinds import (
+    IMU_KIND,
+    INERTIAL_FIGURES,
+    LEVER_ARM_KIND,
+    NAVIGATION_KIND,
+    VIBRATION_KIND,
+)
 from bisar_budget.geometry import STILL_SPEED_MPS, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE_FRACTION
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE_FRACTION, MOTION_KINDS
 from bisar_budget.mission.instruments import MAX_FALL_DB_PER_DECADE, MAX_RISE_DB_PER_DECADE
 from bisar_budget.mission.model import (
     MISSION,
@@ -73,7 +81,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
         if steps[1] == "oscillator":
             if platform.oscillator is None or (steps[2] == "frequency" and platform.oscillator.sensor is not None):
                 return False  # the noise of a part holds at the part's frequency
-            return is_stated or steps[2] in ("frequency", "bandwidth", "level")
+            return is_stated or steps[2] in _OPTIONAL_OSCILLATOR_SIZES
         return not flies_on_earth(mission) and _is_held_of_path(platform, steps[1], is_stated)
     if section == "earth_orientation":
         return False
@@ -82,22 +90,33 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     return is_stated or section in _FREE or key in _FREE
 
 
+# Numbers that an array may replace even if the file does not state them: of an oscillator, of a motion error, and
+# all numbers of some sections of a motion error.
+_OPTIONAL_OSCILLATOR_SIZES = ("frequency", "bandwidth", "level")
+_SPECTRUM_LEVEL, *_OPTIONAL_SIZES = (
+    kind.path("receiver", axis)[3:]
+    for kind, axis in (
+        (VIBRATION_KIND, "spectrum"),
+        (TIME_TAG_KIND, ""),
+        (LEVER_ARM_KIND, "uncertainty"),
+        (NAVIGATION_KIND, ""),
+    )
+)
+_OPTIONAL_SECTIONS = (IMU_KIND.name, "registered")
+
+
 def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool) -> bool:
     """Whether an array can replace a number of a motion error.
 
     `steps` are the parts of its key below the motion error; `is_stated` tells whether the file states the number.
     """
     if steps[0] in MOTION:
-        return steps[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
+        return steps[0] not in MOTION_KINDS or error.covariance is None  # which a covariance replaces
     if steps[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
-    if steps == ["vibration", "spectrum_level"]:
+    if tuple(steps) == _SPECTRUM_LEVEL:
         return error.vibration.spectrum is not None  # the level shifts the spectrum
-    return (
-        is_stated
-        or steps[0] in ("imu", "registered")
-        or tuple(steps) in (("time_tag",), ("lever_arm", "uncertainty"), ("navigation", "level"))
-    )
+    return is_stated or steps[0] in _OPTIONAL_SECTIONS or tuple(steps) in _OPTIONAL_SIZES
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
@@ -196,7 +215,8 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 # Dimensions that a factor does not multiply: times and frequencies of errors, and settings.
 _UNSCALED_DIMENSIONS = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
 # Exceptions by key: a time and a ratio that are errors, and a length that is no error.
-_OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
+_SCALE_FACTORS = tuple(figure.key for figure in INERTIAL_FIGURES.values() if figure.is_scale)
+_OF_ERRORS, _MEASURES = (TIME_TAG_KIND.name, *_SCALE_FACTORS), ("arm",)
 _ERROR_SECTIONS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED_KEYS = (
     "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "

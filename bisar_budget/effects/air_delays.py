@@ -27,6 +27,7 @@ from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, factor
 from bisar_budget.effects.range_processes import departure_at_nodes
 from bisar_budget.effects.spectra import gauss_markov
+from bisar_budget.error_kinds.random_kinds import PROPAGATION_KIND
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
@@ -41,7 +42,6 @@ ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s², e²/(8π²ε₀mₑ) (CODATA 2018)
 TROPOSPHERE_HEIGHT_M = 7e3  # m, height of a thin shell in place of a spherical troposphere
 IONOSPHERE_HEIGHT_M = 350e3  # m, height of the shell of free electrons, unless the platform is lower
 DELAY, CONTENT = DELAYS
-DELAY_UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
 
 def obliquity(position: Vectors, shell: PerCase) -> PerCase:
@@ -175,7 +175,7 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
         for delay in DELAYS
     }
     for name, delay in by_leg:
-        counted = subject("mission", "propagation", delay).id if propagation.is_one_air else ""
+        counted = subject("mission", PROPAGATION_KIND.name, delay).id if propagation.is_one_air else ""
         yield _delay_error(seen, name, delay, [by_leg[name, delay]], counted)
     for delay in DELAYS if propagation.is_one_air else ():
         yield _delay_error(seen, "mission", delay, [by_leg[name, delay] for name in PLATFORMS])
@@ -213,10 +213,10 @@ def _delay_error(
     else:
         published, full = _changing(seen, delay, moving, at_mid_aperture[0], correlation_time)
     return RandomError(
-        subject=subject(owner, "propagation", delay),
-        unit=DELAY_UNITS[delay],
+        subject=subject(owner, PROPAGATION_KIND.name, delay),
+        unit=PROPAGATION_KIND.size(delay).unit,
         declared=None if value is None else value * seen.factor,
-        path=("propagation", delay) if propagation is None else propagation.path(name, delay),
+        path=PROPAGATION_KIND.path("mission", delay) if propagation is None else propagation.path(name, delay),
         published=published,
         full=full,
         spreads=correlation_time is not None,

@@ -24,6 +24,7 @@ from bisar_budget.arrays import Booleans, Floats, Indices, PerCase, PerCaseFlag
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT_RATIO
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vectors, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
@@ -653,7 +654,7 @@ class DeclaredErrors:
         published, self.published_angle_deg = published_planes(geometries)
         self.planes: dict[str, Any] = {"published": published, "full": OwnPlane()}
         half = exact.half
-        self.edge: dict[str, PerCase] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
+        self.edge = [kind.course(half) for kind in STATE_KINDS]
         quadratic, cubic, hidden, moved = exact.most_per_metre
         self.per_metre = np.array((quadratic + self.gain * hidden, cubic, moved))[:, None]
         quadratic, cubic = exact.k * np.hypot(*(np.abs(gradient[2:]) for gradient in exact.gradient))
@@ -707,7 +708,7 @@ class DeclaredErrors:
         is the larger value of the two. It is 0 for an error that moves no platform.
         """
         if not error.is_time_tag and error.shifts is None:
-            return self.edge.get(error.unit, 0.0)
+            return 0.0 if error.kind.order is None else self.edge[error.kind.order]
         farthest: Floats = np.max([norm(error.way_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
         return farthest
 
@@ -734,7 +735,7 @@ class DeclaredErrors:
         """
         if not error.platforms:
             return -1
-        return 0 if error.is_time_tag or error.shifts is not None else list(self.edge).index(error.unit)
+        return error.kind.order or 0 if error.shifts is None else 0
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
         """Position error at the nodes per unit of an error, along its direction, (nodes, cases). [m/unit]
@@ -744,7 +745,7 @@ class DeclaredErrors:
         """
         exact = self.exact
         if order >= 0:
-            return exact.powers[list(self.edge)[order]]
+            return exact.powers[order]
         if error.clock is not None:
             return exact.clock_course(error.clock)
         # A pure phase error: a quadratic that displaces nothing.

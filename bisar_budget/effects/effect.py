@@ -13,7 +13,9 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.arrays import PerCase, PerCaseFlag
-from bisar_budget.error_kinds import STATE_KINDS, ErrorKind, Motion, MotionKind, SourceKind, kind_of
+from bisar_budget.error_kinds.kind import ErrorKind, SourceKind
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
+from bisar_budget.error_kinds.registry import kind_of
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import (
     BistaticGeometry,
@@ -75,8 +77,6 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
 
 PLATFORMS = ("transmitter", "receiver")
 _PLATFORMS_OF = {name: (index,) for index, name in enumerate(PLATFORMS)}  # indices by owner of an error
-MOTION_UNITS = {kind.name: kind.unit for kind in STATE_KINDS}
-CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}  # t̃₀ … t̃₃ of (1)
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
@@ -133,8 +133,7 @@ class ErrorSource(NamedTuple):
 
     `shifts` are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for each axis.
     [m/unit] They are set for a registered kind of error. They are also set if a platform is in free fall, where the
-    motion follows the dynamics of the orbit. Otherwise they are None. `is_registered` marks an error of a registered
-    kind, which moves its platform by `shifts` whether the platform is in free fall or not.
+    motion follows the dynamics of the orbit. Otherwise they are None.
 
     `rates` are velocities at mid-aperture per unit of a position error in the frame `ric`, if a platform is in free
     fall. Such an error has no velocity in inertial space, and therefore has a velocity in the axes of the scene,
@@ -157,7 +156,6 @@ class ErrorSource(NamedTuple):
     of_receiver: Vectors | None = None
     shifts: tuple[VectorArrays, VectorArrays] | None = None
     rates: tuple[Vectors, Vectors] | None = None
-    is_registered: bool = False
 
     @property
     def id(self) -> str:
@@ -191,15 +189,16 @@ class ErrorSource(NamedTuple):
         """
         return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
 
-    def state_of(self, platform_index: int) -> tuple[Any, Any, Any]:
+    def state_of(self, platform_index: int) -> tuple[Vectors, Vectors, Vectors]:
         """Position, velocity and acceleration error of a platform at mid-aperture per unit of the error.
 
         The three vectors are in m, m/s and m/s² per unit.
         """
-        vectors: list[Any] = [NOWHERE, NOWHERE, NOWHERE]
+        vectors: list[Vectors] = [NOWHERE, NOWHERE, NOWHERE]
         if self.rates is not None:
             vectors[1] = self.rates[platform_index]
-        vectors[tuple(MOTION_UNITS.values()).index(self.unit)] = self.direction_of(platform_index)
+        if self.kind.order is not None:
+            vectors[self.kind.order] = self.direction_of(platform_index)
         return vectors[0], vectors[1], vectors[2]
 
     @property
@@ -218,17 +217,17 @@ class ErrorSource(NamedTuple):
 
         On a turning path the effect of such an error is not proportional to its size.
         """
-        return self.kind.flown_as == "time_tag"
+        return self.kind.shifts_time
+
+    @property
+    def is_registered(self) -> bool:
+        """Whether another package registered the kind of the error, whose motion is then `shifts`."""
+        return self.kind.is_registered
 
     @property
     def kind(self) -> SourceKind:
         """Object of the error's kind, with the properties that commands need."""
         return self.subject.source_kind
-
-    @property
-    def motion(self) -> Motion | None:
-        """Function for the motion of a platform per unit of a registered kind of error; None for any other kind."""
-        return self.kind.moved if self.is_registered and isinstance(self.kind, MotionKind) else None
 
     @property
     def is_covered(self) -> bool:

@@ -20,7 +20,6 @@ here.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -39,6 +38,14 @@ from bisar_budget.effects.random_effect import (
     parts_of_largest,
 )
 from bisar_budget.effects.spectra import gauss_markov
+from bisar_budget.error_kinds.random_kinds import (
+    IMU_KIND,
+    INERTIAL_FIGURES,
+    LEVER_ARM_KIND,
+    RANDOM_KIND,
+    TRAJECTORY_KIND,
+    InertialFigure,
+)
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vectors, cross, unit, without_rounding
 from bisar_budget.image_plane import nodes
@@ -48,54 +55,6 @@ from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, Lo
 
 _CONSTANT_S = 1e9  # correlation time of an error that is constant over any aperture
 _UNIFORM_SIGMA_RATIO = 12**-0.5  # ratio of sigma to step for an error that is uniformly distributed over the step
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class InertialFigure:
-    """A declared error of an inertial sensor, such as the bias of its gyros.
-
-    Attributes
-    ----------
-    name : str
-        Key of the error in the file, and the axis of its row.
-    unit : str
-        Unit of the error in SI.
-    integrals : int
-        Number of integrations over time from the error to the position error. A constant error that is integrated n
-        times becomes τⁿ/n!.
-    spreads : bool
-        Whether the error is noise, which spreads power. Otherwise it is a random constant.
-    tilts : bool
-        Whether the error tilts the axes of the sensor. A tilt rotates the specific force, and the lever arm.
-    is_scale : bool
-        Whether the error is a fraction of the specific force.
-    """
-
-    name: str
-    unit: str
-    integrals: int
-    spreads: bool = False
-    tilts: bool = False
-    is_scale: bool = False
-
-    @property
-    def growth_power(self) -> int:
-        """Exponent of the aperture time to which the covariance of the position error is proportional."""
-        return 2 * self.integrals - self.spreads
-
-
-# Figures of an inertial sensor by name, in the order of `evaluators.inertial_phases`.
-INERTIAL_FIGURES: Mapping[str, InertialFigure] = {
-    figure.name: figure
-    for figure in (
-        InertialFigure(name="accelerometer_bias", unit="m/s^2", integrals=2),
-        InertialFigure(name="accelerometer_scale_factor", unit="1", integrals=2, is_scale=True),
-        InertialFigure(name="attitude", unit="rad", integrals=2, tilts=True),
-        InertialFigure(name="gyro_bias", unit="rad/s", integrals=3, tilts=True),
-        InertialFigure(name="velocity_random_walk", unit="m/s/sqrt(s)", integrals=2, spreads=True),
-        InertialFigure(name="angle_random_walk", unit="rad/sqrt(s)", integrals=3, spreads=True, tilts=True),
-    )
-}
 
 
 # ---------------------------------------------------------------------- correlated noise of a position
@@ -183,7 +142,9 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     arm = None if stated is None else arm_at(state, stated, seen.exact.times)
     force = seen.vector(specific_force(seen.mission, state))
     for index, figure in enumerate(INERTIAL_FIGURES.values()):
-        values, key = getattr(error.imu, figure.name), error.key_of(figure.name)
+        values, path = getattr(error.imu, figure.key), IMU_KIND.path(name, figure.key)
+        if error.is_of_part(figure.key):
+            path = _path_of_sensor(name)
         declared, about = None, axes
         directions = acceleration_errors(figure, axes, force)
         if values is not None:
@@ -197,15 +158,20 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, figure, along))
             full = _over_aperture(seen, platform_index, figure, directions)
         yield RandomError(
-            subject=subject(name, "imu", figure.name),
+            subject=subject(name, IMU_KIND.name, figure.key),
             unit=figure.unit,
             declared=None if declared is None else declared * seen.factor,
-            path=("platforms", name, "motion_error", *(("imu", key) if key == figure.name else (key,))),
+            path=path,
             published=published,
             full=full,
             spreads=figure.spreads,
             moves=_moves_by_imu(seen, platform_index, figure, directions, about, arm) if seen.has_edge else (),
         )
+
+
+def _path_of_sensor(name: str) -> KeyPath:
+    """Path of the key that names the parts of a platform from which figures of its motion error come."""
+    return (*IMU_KIND.section(name)[:-1], "sensor")
 
 
 def _moves_by_imu(
@@ -359,7 +325,6 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     if lever is None:
         return
     platform_index, state, times = PLATFORMS.index(name), getattr(seen.geometry, name), seen.exact.times
-    key = ("platforms", name, "motion_error")
     if lever.arm is not None and error.navigation is None:  # which includes the swing of the arm
         declared, axes = None, seen.axes(name)
         attitude = None if error.imu is None else error.imu.attitude
@@ -367,19 +332,26 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(attitude))
             declared, axes = declared * seen.factor, axes * sizes[:, None]
         published, full = seen.of_motion(platform_index, swung(axes, arm_at(state, lever.arm, times)))
-        is_of_sensor = error.key_of("attitude") != "attitude"
-        path: KeyPath = (*key, "sensor") if is_of_sensor else (*key, "imu", "attitude")
-        row_subject = subject(name, "lever_arm", "attitude")
-        counted = subject(name, "imu", "attitude").id
-        yield RandomError(row_subject, "rad", declared, path, published, full, spreads=False, counted_in=counted)
+        path = _path_of_sensor(name) if error.is_of_part("attitude") else LEVER_ARM_KIND.path(name, "attitude")
+        row_subject, unit = subject(name, LEVER_ARM_KIND.name, "attitude"), LEVER_ARM_KIND.size("attitude").unit
+        counted = subject(name, IMU_KIND.name, "attitude").id
+        yield RandomError(row_subject, unit, declared, path, published, full, spreads=False, counted_in=counted)
     if lever.uncertainty is not None:
         declared, sizes = parts_of_largest(seen.vector(lever.uncertainty))
         ways = body_axes(state, times) * sizes[:, None, None]
         published, full = seen.of_motion(platform_index, ways)
-        row_subject = subject(name, "lever_arm", "uncertainty")
-        path = (*key, "lever_arm", "uncertainty")
+        axis = "uncertainty"
         moves = (Moves(platform_index, ways, np.ones((1, len(times), 1))),)
-        yield RandomError(row_subject, "m", declared * seen.factor, path, published, full, spreads=False, moves=moves)
+        yield RandomError(
+            subject(name, LEVER_ARM_KIND.name, axis),
+            LEVER_ARM_KIND.size(axis).unit,
+            declared * seen.factor,
+            LEVER_ARM_KIND.path(name, axis),
+            published,
+            full,
+            spreads=False,
+            moves=moves,
+        )
 
 
 def _with_arm(
@@ -484,16 +456,15 @@ def _legendre(abscissas: Floats, count: int) -> Floats:
 # ---------------------------------------------------------------------- position noise
 def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield an error for each process of correlated noise that the file states for a platform's position."""
-    error = seen.error(name)
-    key = error.key_of("random")
+    error, kind = seen.error(name), RANDOM_KIND
     for index, process in enumerate(error.random):
-        path = ("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,)))
+        path = _path_of_sensor(name) if error.is_of_part(kind.name) else kind.path(name, index=index)
         yield _noise(seen, _Process.of(process, name), {name: seen.axes(name)}, path)
 
 
 def residual_subject(name: str) -> Subject:
     """Subject of the error due to the residuals of a platform's log about the smooth path."""
-    return subject(name, "trajectory", "residual")
+    return subject(name, TRAJECTORY_KIND.name, "residual")
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
@@ -515,10 +486,10 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     log = None if path is None else path.log_noise
     if log is None or log.processed != RAW:
         return
-    key = ("platforms", name, "trajectory", "processed")
     for figure, (sizes, axes, correlation_time) in _log_parts(log, seen.cases).items():
-        process = _Process(subject(name, "trajectory", figure), tuple(sizes), correlation_time, figure == "residual")
-        yield _noise(seen, process, {name: axes}, key)
+        row_subject = subject(name, TRAJECTORY_KIND.name, figure)
+        process = _Process(row_subject, tuple(sizes), correlation_time, figure == "residual")
+        yield _noise(seen, process, {name: axes}, TRAJECTORY_KIND.path(name))
 
 
 def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
@@ -555,7 +526,7 @@ def common_noise(seen: SensorCases) -> Iterator[RandomError]:
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
         axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}
-        yield _noise(seen, _Process.of(process, "mission"), axes, ("common_motion_error", "random", index, "sigma"))
+        yield _noise(seen, _Process.of(process, "mission"), axes, RANDOM_KIND.path("mission", index=index))
 
 
 class _Process(NamedTuple):
@@ -571,7 +542,7 @@ class _Process(NamedTuple):
 
     @classmethod
     def of(cls, process: GaussMarkov, owner: str) -> "_Process":
-        return cls(subject(owner, "random", process.name), process.sigma, process.correlation_time)
+        return cls(subject(owner, RANDOM_KIND.name, process.name), process.sigma, process.correlation_time)
 
 
 def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], path: KeyPath) -> RandomError:
@@ -594,7 +565,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     quadratic, cubic, left = (np.sqrt(square) for square in moments[:3])
     return RandomError(
         subject=process.subject,
-        unit="m",
+        unit=process.subject.source_kind.unit,
         declared=largest * seen.factor,
         path=path,
         published=RandomEffect(

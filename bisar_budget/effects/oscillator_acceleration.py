@@ -28,6 +28,7 @@ from bisar_budget.effects.oscillator_tones import LeftTone, left_of_tone
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece
 from bisar_budget.effects.vibration import power_of, spectrum_parts, spectrum_pieces
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
 from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
@@ -178,11 +179,10 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
     if turn is not None:
         published, full = _together(published, turn[0]), _together(full, turn[1])
     published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
-    path = ("platforms", name, "oscillator", "acceleration_sensitivity")
-    row_subject = subject(name, "oscillator", "acceleration")
-    yield RandomError(
-        row_subject, "s^2/m", felt_vibration.sensitivity * seen.factor + np.zeros(seen.cases), path, published, full
-    )
+    row_subject, size = subject(name, OSCILLATOR_KIND.name, "acceleration"), OSCILLATOR_KIND.size("acceleration")
+    declared = felt_vibration.sensitivity * seen.factor + np.zeros(seen.cases)
+    path = OSCILLATOR_KIND.path(name, row_subject.axis)
+    yield RandomError(row_subject, size.unit, declared, path, published, full)
 
 
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:

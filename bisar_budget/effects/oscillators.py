@@ -18,6 +18,7 @@ from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND, SYNCHRONIZATION_KIND
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
@@ -246,10 +247,10 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
         if spur.name == name and slow is not None:
             tones += slow.rows.reshape(len(tones), -1)
     published, full = _of_clock(seen, Parts(*noise_parts * scale), Parts(*tones))
-    key = ("platforms", name, "oscillator")
-    path = key if oscillator.sensor is None else (*key, "sensor")
+    kind = OSCILLATOR_KIND
+    path = kind.section(name) if oscillator.sensor is None else (*kind.section(name), "sensor")
     error = RandomError(
-        subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
+        subject(name, kind.name), kind.unit, 1.0, path, published.times(seen.factor), full.times(seen.factor)
     )
     yield error._replace(
         continued=_continued(seen, name, oscillator, scale),
@@ -395,5 +396,6 @@ def link_noise(seen: SensorCases) -> Iterator[RandomError]:
     left = Parts(*parts).without_constant()  # a constant phase does not displace the image
     published, full = _of_clock(seen, left, Parts(*np.zeros_like(parts)))
     published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
-    row_subject = subject("clock", "synchronization")
-    yield RandomError(row_subject, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)
+    kind = SYNCHRONIZATION_KIND
+    row_subject, declared = subject("clock", kind.name), sync.error * seen.factor
+    yield RandomError(row_subject, kind.unit, declared, kind.path("clock"), published, full)

@@ -28,7 +28,7 @@ from bisar_budget.effects.range_processes import (
 )
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.image_plane import LEGENDRE_LEADING, nodes_for
@@ -184,6 +184,11 @@ class RandomError(NamedTuple):
     def kind(self) -> SourceKind:
         """Kind of the error, which holds the properties that all errors of the kind share."""
         return self.subject.source_kind
+
+    @property
+    def equation(self) -> str:
+        """Source of the effect of the error, for reports."""
+        return self.kind.size(self.subject.axis).equation
 
     @property
     def is_covered(self) -> bool:

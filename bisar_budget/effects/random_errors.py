@@ -25,6 +25,7 @@ from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
 from bisar_budget.effects.oscillators import link_noise, oscillator_noise
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.vibration import vibration_spectrum
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 
@@ -33,7 +34,7 @@ _CUBIC_EFFECT = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.
 _DISPLACEMENT_EFFECT = RandomEffect(
     0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None]
 )
-_UNIT_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC_EFFECT), "location_error": ("m", _DISPLACEMENT_EFFECT)}
+_UNIT_EFFECTS = {"cubic_phase_error": _CUBIC_EFFECT, "location_error": _DISPLACEMENT_EFFECT}
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
@@ -63,13 +64,12 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
     """Yield the errors for which the file states a cubic phase or a displacement determined elsewhere."""
     for index, stated in enumerate(mission.other_errors):
-        for key, (unit, effect) in _UNIT_EFFECTS.items():
+        for key, effect in _UNIT_EFFECTS.items():
             size = getattr(stated, key)
             if size is not None:
-                row_subject = subject("mission", "other", f"{stated.name}.{key}", entry=index)
-                yield RandomError(
-                    row_subject, unit, np.abs(size), ("other_errors", index, key), effect, effect, spreads=False
-                )
+                row_subject = subject("mission", OTHER_KIND.name, f"{stated.name}.{key}", entry=index)
+                unit, path = OTHER_KIND.size(key).unit, OTHER_KIND.path("mission", key, index)
+                yield RandomError(row_subject, unit, np.abs(size), path, effect, effect, spreads=False)
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:

@@ -15,7 +15,6 @@ from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.combined import squared
 from bisar_budget.effects.effect import (
-    CLOCK_UNITS,
     NOWHERE,
     PLATFORMS,
     ErrorSource,
@@ -23,7 +22,11 @@ from bisar_budget.effects.effect import (
     override_notes,
     subject,
 )
-from bisar_budget.error_kinds import POSITION_KIND, STATE_KINDS, MotionKind, StateKind, kind_of
+from bisar_budget.error_kinds.clock_kinds import FREQUENCY_KIND, OSCILLATOR_KIND, TIME_KIND, TIMING_KIND
+from bisar_budget.error_kinds.kind import AS_STATED
+from bisar_budget.error_kinds.path_kinds import POSITION_KIND, STATE_KINDS, TERRAIN_KIND, TIME_TAG_KIND, StateKind
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND
+from bisar_budget.error_kinds.registry import MotionKind, kind_of
 from bisar_budget.faults import KeyPath, MotionKindError
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, VectorArrays, Vectors, dot
 from bisar_budget.image_plane import nodes_for
@@ -42,11 +45,6 @@ AnyVector = TypeVar("AnyVector", VectorArrays, Vectors)
 _UNIT_VECTORS: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # effect of a pure phase error
 _FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
-# Vectors along which an error has to be to defocus the image, singular and plural. A position error never does.
-_DEFOCUSING_VECTORS: Mapping[str, tuple[str, str]] = {
-    "velocity": ("velocity", "velocities"),
-    "acceleration": ("line of sight", "lines of sight"),
-}
 
 
 def exact_ranges(
@@ -65,17 +63,17 @@ def exact_ranges(
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
     """Name of the distribution of a declared error: `normal`, `uniform` or `bound`.
 
-    A clock error is `normal`, because the file states one sigma. An error of a platform, or of both platforms in
-    common, has the distribution that its motion error states. Any other error is a `bound`.
+    It is that of the error's size (`ErrorSize.distribution`), or else the one that the file states for the motion
+    error of the platform, or of both platforms in common.
     """
-    if source.clock is not None:
-        # A clock's values are one sigma: the coverage factor multiplies them.
-        return "normal"
+    distribution = source.kind.size(source.subject.axis).distribution
+    if distribution != AS_STATED:
+        return distribution
+    error = mission.common_motion_error
     if source.owner in PLATFORMS:
-        return str(getattr(mission.platforms, source.owner).motion_error.distribution)
-    if source.is_common and mission.common_motion_error is not None:
-        return mission.common_motion_error.distribution
-    return "bound"
+        error = getattr(mission.platforms, source.owner).motion_error
+    assert error is not None
+    return error.distribution
 
 
 # The evaluators accept and return numbers, or arrays of cases.
@@ -153,7 +151,7 @@ class ErrorListing:
         """
         if (platform_index, kind.order) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
-            effects = self.exact.effect(along * self.exact.powers[kind.unit])
+            effects = self.exact.effect(along * self.exact.powers[kind.order])
             self._full_legs[platform_index, kind.order] = _of_each(effects)
         return self._full_legs[platform_index, kind.order]
 
@@ -176,10 +174,6 @@ class ErrorListing:
     def _flown(self, kind: StateKind, errors: Sequence[Mapping[int, Vectors]], frame: str) -> list[_Flown]:
         """Effects of motion errors, and the motions they cause, where at least one platform is in free fall.
 
-        In free fall a motion error follows the dynamics of the orbit. Velocities in the frame `ric` are inertial. A
-        position error in this frame, without a velocity error, is therefore a vector that keeps its direction in
-        inertial space. In all other frames the vector rotates with the Earth.
-
         Parameters
         ----------
         kind : StateKind
@@ -193,20 +187,11 @@ class ErrorListing:
         moved = np.zeros((len(errors), *self.exact.times.shape))
         for index, directions in enumerate(errors):
             for platform_index, direction in directions.items():
-                motions, fall = self._motions[platform_index], self.geometry.both[platform_index].fall
-                is_at_rest = kind.order == 0 and frame == "ric" and fall is not None
-                rate = fall.rate_against_stars(direction) if is_at_rest and fall else NOWHERE
-                if motions is None:
-                    course = self.exact.powers[kind.unit]
-                    x, y, z = (component * course for component in direction)
-                else:
-                    state = motions[kind.order]
-                    x, y, z = sum(state[axis] * direction[axis] for axis in range(3))
-                    if is_at_rest:
-                        turned = sum(motions[1][axis] * rate[axis] for axis in range(3))
-                        x, y, z = x + turned[0], y + turned[1], z + turned[2]
-                rates[index][platform_index], shifts[index][platform_index] = rate, (x, y, z)
-                moved[index] += self.exact.along(platform_index, (x, y, z))
+                path = self.geometry.both[platform_index]
+                shift = kind.moved(path, self.exact.times, direction, frame, self._motions[platform_index])
+                rates[index][platform_index] = kind.rate(path, direction, frame)
+                shifts[index][platform_index] = shift
+                moved[index] += self.exact.along(platform_index, shift)
         has_rates = kind.order == 0 and frame == "ric"
         return [
             _Flown(full, _of_both_platforms(shift), _of_both_platforms(rate) if has_rates else None)
@@ -222,9 +207,9 @@ class ErrorListing:
         in_scene = error.frame == "scene"
         published = self.published_legs(platform_index, kind)
         axes = self.geometry.both[platform_index].frame(error.frame)
-        covariance = error.covariance if kind.order < 2 else None  # which has no accelerations
+        covariance = error.covariance if kind.has_covariance else None
         key = "covariance" if covariance is not None else error.key_of(kind.name)
-        path: KeyPath = ("platforms", name, "motion_error", key)
+        path: KeyPath = (*kind.section(name)[:-1], key)
         notes, evidence = override_notes(name, error.overridden, kind.name), error.evidence(kind.name)
         # Where the file states an error along other axes, its scene axes are listed only if all rows are.
         listed_axes = [
@@ -293,18 +278,16 @@ class ErrorListing:
         """
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
-        for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
-            value, row_subject = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
+        for power, term in enumerate(TIMING_KIND.sizes):
+            value, row_subject = getattr(self.mission.timing_error, term), subject("clock", TIMING_KIND.name, term)
             if self._is_listed(row_subject, value) and not (is_set and power < 2):  # `_of_setting` lists these
-                terms = tuple(float(power == order) for order in range(4))
                 no_limit = (
                     phrases.note("no-quadratic-term-of-clock", term=term)
                     if is_heard
                     else phrases.note("clock-is-heard")
                 )
-                equation = "Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1"
-                path = ("timing_error", term)
-                yield self._of_terms(row_subject, unit, value, path, terms, no_limit, equation, is_heard=is_heard)
+                terms = TIMING_KIND.clock_size(term).terms()
+                yield self._of_terms(row_subject, value, terms, no_limit, is_heard=is_heard)
         yield from self._of_setting()
         for name in PLATFORMS:
             yield from self._of_aging(name)
@@ -312,12 +295,9 @@ class ErrorListing:
     def _of_terms(
         self,
         row_subject: Subject,
-        unit: str,
         value: PerCase | None,
-        path: KeyPath,
         terms: tuple[PerCase, ...],
         no_limit: Note,
-        equation: str = "Table I row 1",
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
@@ -333,15 +313,16 @@ class ErrorListing:
         of_terms = (
             [term * per_term for per_term in row] for term, row in zip(terms, rows, strict=True) if np.any(term)
         )
+        kind, size = row_subject.source_kind, row_subject.source_kind.size(row_subject.axis)
         return ErrorSource(
             subject=row_subject,
-            unit=unit,
+            unit=size.unit,
             declared=None if value is None else value * self.factor,
-            path=path,
+            path=kind.path(row_subject.owner, row_subject.axis),
             effect=Effect._make(map(sum, zip((0.0,) * 4, *of_terms, strict=True))),
             full=self.exact.effect(self.exact.clock_course(clock)),
             direction=NOWHERE,
-            equation=equation,
+            equation=size.equation,
             no_limit=no_limit,
             evidence=evidence,
             clock=clock,
@@ -356,25 +337,13 @@ class ErrorListing:
         sync = self.mission.synchronization
         if sync is None:
             return
-        frequency: tuple[PerCase, ...] = (
-            sync.age if sync.is_holdover and sync.age is not None else 0.0,
-            1.0,
-            0.0,
-            0.0,
-        )
-        if sync.is_direct_path:
-            frequency = self._delay_of_the_echo
-        for kind, unit, value, terms in (
-            ("time", "s", sync.time_error, (1.0, 0.0, 0.0, 0.0)),
-            ("frequency", "s/s", sync.frequency_error, frequency),
-        ):
-            row_subject = subject("clock", kind)
+        age = sync.age if sync.is_holdover and sync.age is not None else 0.0
+        for kind, value in ((TIME_KIND, sync.time_error), (FREQUENCY_KIND, sync.frequency_error)):
+            row_subject, size = subject("clock", kind.name), kind.clock_size()
             if value is not None or (sync.is_holdover and self._is_listed(row_subject, value)):
-                path, no_limit = (
-                    ("synchronization", f"{kind}_error"),
-                    phrases.note("no-quadratic-term-of-setting", kind=kind),
-                )
-                yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
+                terms = self._delay_of_the_echo if size.order and sync.is_direct_path else size.terms(age)
+                no_limit = phrases.note("no-quadratic-term-of-setting", kind=kind.name)
+                yield self._of_terms(row_subject, value, terms, no_limit, evidence=sync.source)
 
     @property
     def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
@@ -399,14 +368,13 @@ class ErrorListing:
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
         if oscillator is None:
             return
-        row_subject, value = subject(name, "oscillator", "aging"), oscillator.aging
+        row_subject, value = subject(name, OSCILLATOR_KIND.name, "aging"), oscillator.aging
         is_set, age = sync is not None and sync.is_holdover, 0.0 if sync is None or sync.age is None else sync.age
         if value is None and not (is_set and self._is_listed(row_subject, value)):
             return
-        path = ("platforms", name, "oscillator", "aging")
-        terms: tuple[PerCase, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
-        if is_set:
-            terms = (age**2 / 2, age, 0.5, 0.0)
+        terms = OSCILLATOR_KIND.clock_size("aging").terms(age)
+        if not is_set:
+            terms = (0.0, 0.0, terms[2] * (sync is None), 0.0)
         no_limit = (
             phrases.note("aging-is-followed")
             if sync is not None
@@ -414,9 +382,7 @@ class ErrorListing:
         )
         yield self._of_terms(
             row_subject,
-            "1/s",
             value,
-            path,
             terms,
             no_limit,
             evidence=dict(oscillator.of_parts).get("aging", oscillator.source),
@@ -457,8 +423,8 @@ class ErrorListing:
                         # and ½s̈·x̂ cancel. The rest of a sum of rounded numbers would give a limit where none exists.
                         full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
                 no_limit = phrases.note("no-quadratic-term-of-position")
-                if kind.order > 0:
-                    _, vectors = _DEFOCUSING_VECTORS[kind.name]
+                if kind.defocusing_vectors:
+                    _, vectors = kind.defocusing_vectors
                     no_limit = phrases.note(
                         "no-common-component", cause=vectors, axis=name if in_scene else _axis_of(error.frame, name)
                     )
@@ -466,7 +432,7 @@ class ErrorListing:
                     subject=row_subject,
                     unit=kind.unit,
                     declared=None if values is None else values[axis] * self.factor,
-                    path=("common_motion_error", kind.name, axis),
+                    path=kind.path("mission", index=axis),
                     effect=published,
                     full=full,
                     direction=ways[0],
@@ -500,52 +466,44 @@ class ErrorListing:
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
             if error.time_tag is not None:
-                key: KeyPath = ("platforms", name, "motion_error", "time_tag")
-                yield self._of_time_tag(name, (platform_index,), error.time_tag, key, error.source)
+                yield self._of_time_tag(name, (platform_index,), error.time_tag, error.source)
         common = self.mission.common_motion_error
         if common is not None and common.time_tag is not None:
             note = phrases.note("held-to-the-total", owners="both platforms")
-            key = ("common_motion_error", "time_tag")
-            yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
+            yield self._of_time_tag("mission", (0, 1), common.time_tag, common.source, note)
 
     def _of_time_tag(
         self,
         owner: str,
         platform_indices: Sequence[int],
         value: PerCase,
-        key: KeyPath,
         source: str | None,
         *notes: Note,
     ) -> ErrorSource:
-        ways = [self._velocities(path) for path in self.geometry.both]
+        kind = TIME_TAG_KIND
+        ways = [kind.moved(path, self.exact.times) for path in self.geometry.both]
         moved = np.sum(
             [self.exact.along(platform_index, ways[platform_index]) for platform_index in platform_indices], axis=0
         )
         effects = [
-            _along(self.published_legs(platform_index, kind), vector)
+            _along(self.published_legs(platform_index, state), vector)
             for platform_index in platform_indices
-            for kind, vector in zip(STATE_KINDS, self.geometry.both[platform_index].rates, strict=False)
+            for state, vector in zip(STATE_KINDS, self.geometry.both[platform_index].rates, strict=False)
         ]
         return ErrorSource(
-            subject=subject(owner, "time_tag"),
-            unit="s",
+            subject=subject(owner, kind.name),
+            unit=kind.unit,
             declared=value * self.factor,
-            path=key,
+            path=kind.path(owner),
             effect=_sum(effects),
             full=self.exact.effect(moved),
             direction=ways[platform_indices[0]],
-            equation="Tables I and II along the velocity and its rates",
+            equation=kind.size().equation,
             no_limit=phrases.note("no-quadratic-term-of-time-tag"),
             evidence=source,
             notes=notes,
             of_receiver=ways[1] if len(platform_indices) > 1 else None,
         )
-
-    def _velocities(self, path: PlatformState) -> Vectors:
-        """Velocity of a platform at the nodes, three components (nodes, cases). [m/s]"""
-        times = self.exact.times
-        u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
-        return (u, v, w)
 
     def _of_registered_kinds(self) -> Iterator[ErrorSource]:
         """Yield the errors of kinds that packages register, with the effects of the motion that each kind defines.
@@ -570,7 +528,7 @@ class ErrorListing:
                     subject=subject(name, key),
                     unit=kind.unit,
                     declared=value * self.factor,
-                    path=("platforms", name, "motion_error", "registered", key),
+                    path=kind.path(name),
                     effect=Effect(orders[0], orders[1] / exact.half, exact.k * orders[2], exact.k * orders[3]),
                     full=exact.effect(exact.along(platform_index, (x, y, z))),
                     direction=NOWHERE,
@@ -578,7 +536,6 @@ class ErrorListing:
                     no_limit=phrases.note("no-quadratic-term-of-registered", kind=key),
                     evidence=error.source,
                     shifts=((x, y, z), (x, y, z)),
-                    is_registered=True,
                 )
 
     def _resolved(self, kind: MotionKind, path: PlatformState) -> Floats:
@@ -590,9 +547,9 @@ class ErrorListing:
             The motion cannot be used, or it changes so fast that the nodes do not resolve it.
         """
         exact, places = self.exact, self.exact.sampling.places
-        moved = kind.moved(path, exact.times)
+        moved = np.array(kind.moved(path, exact.times))
         between = np.broadcast_to(_BETWEEN_NODES[:, None] * exact.half, (_BETWEEN_NODES.size, exact.times.shape[1]))
-        truth = kind.moved(path, between)
+        truth = np.array(kind.moved(path, between))
         to_orders = np.linalg.inv(np.polynomial.legendre.legvander(places, places.size - 1))
         through = np.polynomial.legendre.legvander(_BETWEEN_NODES, places.size - 1) @ to_orders
         strays = np.abs(np.einsum("tn,anc->atc", through, moved) - truth).max()
@@ -611,17 +568,18 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        published = _sum([self.published_legs(platform_index, POSITION_KIND)[2] for platform_index in (0, 1)])
-        full = _sum([self.full_legs(platform_index, POSITION_KIND)[2] for platform_index in (0, 1)])
+        kind = TERRAIN_KIND
+        legs = [self.published_legs(platform_index, POSITION_KIND) for platform_index in (0, 1)]
+        full_legs = [self.full_legs(platform_index, POSITION_KIND) for platform_index in (0, 1)]
         yield ErrorSource(
-            subject=subject("mission", "terrain"),
-            unit="m",
+            subject=subject("mission", kind.name),
+            unit=kind.unit,
             declared=height,
-            path=("scene", "height_error"),
-            effect=published,
-            full=full,
-            direction=_UNIT_VECTORS[2],
-            equation="full model",
+            path=kind.path("mission"),
+            effect=self._of_both(legs, 2, None),
+            full=self._of_both(full_legs, 2, None),
+            direction=kind.moved(self.geometry.transmitter, self.exact.times),
+            equation=kind.size().equation,
             no_limit=phrases.note("no-quadratic-term-of-height"),
             notes=(phrases.note("held-to-the-total", owners="no platform"),),
         )
@@ -631,14 +589,14 @@ class ErrorListing:
             if stated.quadratic_phase_error is None:
                 continue
             yield ErrorSource(
-                subject=subject("mission", "other", stated.name),
-                unit="rad",
+                subject=subject("mission", OTHER_KIND.name, stated.name),
+                unit=OTHER_KIND.unit,
                 declared=stated.quadratic_phase_error,
-                path=("other_errors", index, "quadratic_phase_error"),
+                path=OTHER_KIND.path("mission", index=index),
                 effect=_PUBLISHED_UNIT,
                 full=_FULL_UNIT,
                 direction=NOWHERE,
-                equation="as declared",
+                equation=OTHER_KIND.size().equation,
                 no_limit=NOTHING,
                 evidence=stated.source,
                 notes=(phrases.note("held-to-the-total", owners="no platform"),),
@@ -654,7 +612,7 @@ def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str
     return tuple(
         (
             subject(name, kind.name, letter),
-            ("platforms", name, "motion_error", kind.name, axis),
+            kind.path(name, index=axis),
             _equation(kind, axis),
             _no_limit(kind, letter),
         )
@@ -724,10 +682,11 @@ def _total(terms: Sequence[PerCase]) -> PerCase:
 
 
 def _equation(kind: StateKind, axis: int | None) -> str:
+    table = kind.size().equation
     if kind.order == 0:
-        return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
+        return table if axis is None else f"{table} row {2 + 3 * axis}"
     first = 3 * kind.order - 2
-    return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
+    return f"{table} rows {first}-{first + 2}" if axis is None else f"{table} row {first + axis}"
 
 
 def _axis_of(frame: str, axis: str) -> str:
@@ -739,7 +698,7 @@ def _no_limit(kind: StateKind, axis: str) -> Note:
 
     `axis` is the name of the axis in the note.
     """
-    if kind.order == 0:
+    if not kind.defocusing_vectors:
         return phrases.note("no-quadratic-term-of-position")
-    vector, _ = _DEFOCUSING_VECTORS[kind.name]
+    vector, _ = kind.defocusing_vectors
     return phrases.note("no-component", cause=vector, axis=axis)

@@ -38,6 +38,7 @@ from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
+from bisar_budget.error_kinds.random_kinds import VIBRATION_KIND
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, Vectors, dot
 from bisar_budget.image_plane import nodes, nodes_for
 from bisar_budget.mission.model import Mission
@@ -463,15 +464,20 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
         track / seen.exact.ranges[platform_index] for track in seen.exact.tracks[platform_index]
     )  # the line of sight, along which the platform vibrates
     published, full = seen.of_parts(noise.times(power_of(vibration)), seen.exact.along(platform_index, (x, y, z)))
-    path = ("platforms", name, "motion_error", "vibration", "spectrum")
-    row_subject = subject(name, "vibration", "spectrum")
+    row_subject, kind = subject(name, VIBRATION_KIND.name, "spectrum"), VIBRATION_KIND
     moves: tuple[Moves, ...] = ()
     if seen.has_edge:  # along the line of sight of the centre: the file states no other motion
         way = seen.factor * seen.vector(getattr(seen.geometry, name).look)[None, :, None]
         courses = seen.courses(noise.times(power_of(vibration)).covariance)
         moves = (Moves(platform_index, way, courses),)
     yield RandomError(
-        row_subject, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor), moves=moves
+        row_subject,
+        kind.size(row_subject.axis).unit,
+        1.0,
+        (*kind.section(name), "spectrum"),
+        published.times(seen.factor),
+        full.times(seen.factor),
+        moves=moves,
     )
 
 

@@ -20,6 +20,7 @@ from textwrap import wrap
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
+from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, MEASURED_KINDS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import (
@@ -419,11 +420,12 @@ def _with_added(
         if program != ADDED or error is None:
             continue
         statement = parameter.text()
-        if kind in ("position", "velocity") and statement == "not declared":
-            uncorrelated = replace(error, correlation=())
-            declared_errors[owner] = (
-                replace(uncorrelated, position=None) if kind == "position" else replace(uncorrelated, velocity=None)
-            )
+        without = {
+            "position": replace(error, correlation=(), position=None),
+            "velocity": replace(error, correlation=(), velocity=None),
+        }
+        if kind in without and statement == "not declared":
+            declared_errors[owner] = without[kind]
         elif kind == "distribution" and statement in ("uniform", "bound"):
             declared_errors[owner] = replace(error, distribution=statement)
         elif kind == "acceleration":
@@ -507,7 +509,6 @@ def _unused_of_sensor(sensor: Element, names: tuple[str, ...], path: str) -> lis
 # ---------------------------------------------------------------------- the mission file
 # A tree of keys, and its text with comments.
 _COMMENT_WIDTH = 110
-_MOTION_KINDS = ("position", "velocity")
 # Higher terms of a path: key, unit, and factor from the coefficient of the Taylor series to the derivative.
 _BENDS = (
     ("jerk", "m/s^3", 6.0),
@@ -610,13 +611,14 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
 
 
 def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
-    units = {"position": "m", "velocity": "m/s"}
     tree: JsonObject = {"frame": error.frame}
     sigmas = {
-        kind: _triple(value, units[kind]) for kind in _MOTION_KINDS if (value := getattr(error, kind)) is not None
+        kind.name: _triple(value, kind.unit)
+        for kind in MEASURED_KINDS
+        if (value := getattr(error, kind.name)) is not None
     }
     if error.correlation:
-        axes = [f"{kind}.{axis}" for kind in _MOTION_KINDS for axis in FRAME_AXES[error.frame]]
+        axes = [f"{kind.name}.{axis}" for kind in MEASURED_KINDS for axis in FRAME_AXES[error.frame]]
         pairs = {
             f"{axes[i]}-{axes[j]}": f"{error.correlation[i][j]:.9f}".rstrip("0")
             for i in range(6)
@@ -627,7 +629,7 @@ def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     else:
         tree |= sigmas
     if error.acceleration is not None:
-        tree["acceleration"] = _triple(error.acceleration, "m/s^2")
+        tree["acceleration"] = _triple(error.acceleration, ACCELERATION_KIND.unit)
     if error.distribution != "normal":
         tree["distribution"] = error.distribution
     tree["source"] = f"{printable(imported.file)}, {imported.errors.at}, one sigma"

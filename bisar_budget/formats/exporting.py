@@ -26,9 +26,10 @@ from bisar_budget import __version__
 from bisar_budget.arrays import Records
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.effects.effect import PLATFORMS, plain
+from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.error_kinds import SourceKind, StateKind
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # position of a scene without coordinates in its mission
 UNDATED = "2000-01-01T12:00:00Z"
+_CLOCK_ELEMENTS = {"DelayBias": "constant", "ClockFreqSF": "linear"}  # terms of the clock error, by CPHD element
 _AREA_MARGIN_CELLS = 24  # of the image area beyond the targets, on each side
 _EXTENT_SAMPLES = 2049  # slow times at which the extent of the signal is computed
 _SWATH_OVERSAMPLING_FACTOR = 1.5  # ratio of frequencies to those that the swath needs; cphdcheck requires 1.2
@@ -443,8 +445,11 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
     added: dict[str, str] = {}
     leaves: _Leaves = {}
     timing = mission.timing_error  # of the receiver's clock, counted against the transmitter's
-    clock = {"DelayBias": timing.constant, "ClockFreqSF": timing.linear}
-    clock_sigmas = {key: abs(value) for key, value in clock.items() if value is not None}
+    clock_sigmas = {
+        element: abs(value)
+        for element, term in _CLOCK_ELEMENTS.items()
+        if (value := getattr(timing, term)) is not None
+    }
     for owner, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
         leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, owner, axes, added))
         # The schema requires CollectionStartTime.
@@ -466,12 +471,13 @@ def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[st
     The sizes do not include the coverage factor. Errors that are already in `added` are left out.
     """
     alone = mission._replace(allocation=mission.allocation._replace(coverage_factor=1.0))
+    clock_subjects = [subject("clock", TIMING_KIND.name, term) for term in _CLOCK_ELEMENTS.values()]
     sizes: dict[str, str] = {}
     for row in check_mission(alone, date.min).rows:
         kind = row.subject.facts
-        has_element = row.id in ("timing.constant", "timing.linear") or row.id in added
+        has_element = row.id in added or row.subject in clock_subjects
         has_element |= isinstance(kind, StateKind) and (row.owner in PLATFORMS or kind.has_covariance)
-        if row.declared is not None and not has_element and isinstance(kind, SourceKind):
+        if row.declared is not None and not has_element and kind.is_source:
             sizes[row.id] = f"{row.declared:.12g} {row.unit}".rstrip()
     return sizes
 
@@ -493,9 +499,9 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
         covariance = np.outer(sigmas, sigmas) * np.array(error.covariance.correlation)
     for index, kind in enumerate(("position", "velocity")):
         block = slice(3 * index, 3 * index + 3)
-        sigmas_of_kind = getattr(error, kind)
-        if sigmas_of_kind is not None:
-            covariance[block, block] = np.diag(np.square(sigmas_of_kind))
+        stated_sigmas = getattr(error, kind)
+        if stated_sigmas is not None:
+            covariance[block, block] = np.diag(np.square(stated_sigmas))
         elif error.covariance is None and (common is None or getattr(common, kind) is None):
             added[f"{owner}.{kind}"] = "not declared"
     if error.acceleration is not None:

@@ -11,7 +11,7 @@ from functools import cache
 
 import yaml
 
-from bisar_budget.error_kinds import motion_kinds
+from bisar_budget.error_kinds.registry import motion_kinds
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import (

@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
 from bisar_budget.json_types import Definitions, JsonObject
@@ -28,7 +29,7 @@ from bisar_budget.mission.readers import (
     read_part,
 )
 
-MOTION_KINDS = ("position", "velocity")
+MOTION_KINDS = tuple(kind.name for kind in MEASURED_KINDS)
 MATRIX_SIZE = 6
 
 # Files have rounded matrices. With six decimals, each correlation is wrong by up to 5e-7. With five correlations in

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 from bisar_budget import units
+from bisar_budget.error_kinds.clock_kinds import FREQUENCY_KIND, TIME_KIND
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
 from bisar_budget.json_types import Definitions, JsonObject
@@ -416,13 +417,12 @@ class Synchronization(NamedTuple):
         float | None,
         Key(
             Quantity(units.TIME, ge=-1e6, le=1e6),
-            "Time error between the clocks after setting, 1 sigma; direct_path: the difference of the channels' "
-            "delays.",
+            TIME_KIND.description,
         ),
     ] = None
     frequency_error: Annotated[
         float | None,
-        Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), "Error of the fractional frequency after setting, 1 sigma."),
+        Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), FREQUENCY_KIND.description),
     ] = None
     source: Source = None
 

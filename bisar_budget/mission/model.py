@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
 from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT_MPS
-from bisar_budget.error_kinds import motion_kind
+from bisar_budget.error_kinds.path_kinds import TERRAIN_KIND
+from bisar_budget.error_kinds.registry import motion_kind
 from bisar_budget.faults import Changed, KeyPath, ParserEvent, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
 from bisar_budget.mission.navigation import MAX_FIX_COUNT
-from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
+from bisar_budget.mission.platforms import FLOWN_SECTIONS, INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
     COORDINATE,
@@ -123,9 +124,7 @@ class Scene(NamedTuple):
     height: Annotated[float | None, Key(HEIGHT, "Height of the centre above the ellipsoid.")] = None
 
     radius: Annotated[float | None, Key(RANGE, "Radius of the scene about its centre.")] = None
-    height_error: Annotated[
-        float | None, Key(COORDINATE, "Height of the scene above the height that the processor assumes.")
-    ] = None
+    height_error: Annotated[float | None, Key(COORDINATE, TERRAIN_KIND.description)] = None
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -764,7 +763,7 @@ def names_files(root: Mapping[str, object]) -> bool:
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return names_requirements(root) or any(
-        key in ("orbit", "trajectory") or (isinstance(item, dict) and ("sensor" in item or "navigation" in item))
+        key in FLOWN_SECTIONS or (isinstance(item, dict) and ("sensor" in item or "navigation" in item))
         for section in sections
         if isinstance(section, dict)
         for key, item in section.items()

@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from bisar_budget.arrays import Booleans
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS
 from bisar_budget.faults import KeyPath, Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, UndefinedFrameError
 from bisar_budget.mission.covariance import MOTION_KINDS, Covariance
@@ -576,7 +577,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
         block = along[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
         if not np.trace(block) > 0:
             continue
-        unit = {"position": "m", "velocity": "m/s"}[kind]
+        unit = MEASURED_KINDS[MOTION_KINDS.index(kind)].unit
         if error.covariance is not None or getattr(error, kind) is not None:
             figure = [format_quantity(sigma, unit) for sigma in np.sqrt(np.diag(block)).tolist()]
             key = f"motion_error.{'covariance' if error.covariance is not None else kind}"

@@ -13,6 +13,8 @@ import numpy as np
 from bisar_budget import units
 from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.constants import LEAST_FALLING_HEIGHT_M
+from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, POSITION_KIND, TIME_TAG_KIND, VELOCITY_KIND
+from bisar_budget.error_kinds.random_kinds import RANDOM_KIND
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
     STILL_SPEED_MPS,
@@ -92,6 +94,7 @@ _FINE_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # Copies of `paths.path_formats`, whose import would load all readers in every check.
+FLOWN_SECTIONS = ("orbit", "trajectory")  # of a platform: they take its path from a file
 SMOOTHED, RAW = "smoothed", "raw"  # path that a processor uses: the log smoothed, or its raw fixes
 _LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 # Keys of a motion error that describe what `navigation` computes.
@@ -114,11 +117,11 @@ class MotionError(NamedTuple):
             "cross-track.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
-        None
-    )
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
+    ] = None
     covariance: Annotated[
         Covariance | None,
         Key(
@@ -139,7 +142,7 @@ class MotionError(NamedTuple):
     imu: Annotated[Imu | None, Key(IMU, "Figures of the inertial sensor.")] = None
     random: Annotated[
         tuple[GaussMarkov, ...],
-        Key(RANDOM, "Position errors that change within the aperture."),
+        Key(RANDOM, RANDOM_KIND.description),
     ] = ()
     navigation: Annotated[
         Navigation | None,
@@ -150,7 +153,7 @@ class MotionError(NamedTuple):
     ] = None
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, "Time error of the navigation against the radar; positive: positions belong to later times."),
+        Key(TIME_TAG, TIME_TAG_KIND.description),
     ] = None
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
@@ -177,7 +180,7 @@ class MotionError(NamedTuple):
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
-        replaced = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
+        replaced = [kind for kind in MOTION_KINDS if values.get(kind) is not None]
         if replaced:
             yield Problem(f"replaces position and velocity, but there is also a {replaced[0]}", at=("covariance",))
         if values.get("distribution", "normal") != "normal":
@@ -202,9 +205,13 @@ class MotionError(NamedTuple):
         """
         return dict(self.of_parts).get(figure, self.source)
 
+    def is_of_part(self, figure: str) -> bool:
+        """Whether a figure comes from a part of the catalogue or from the source of the path, not from a key."""
+        return figure in dict(self.of_parts)
+
     def key_of(self, figure: str) -> str:
         """Key under which the file states a figure; `sensor` if the figure does not come from the file itself."""
-        return "sensor" if figure in dict(self.of_parts) else figure
+        return "sensor" if self.is_of_part(figure) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
@@ -231,11 +238,11 @@ class CommonMotionError(NamedTuple):
             "scene: one vector, east, north, up; track, look, ric: the same components in each platform's own axes.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
-    acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), "Constant part.")] = (
-        None
-    )
+    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
+    acceleration: Annotated[
+        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
+    ] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     random: Annotated[
         tuple[GaussMarkov, ...],
@@ -655,7 +662,7 @@ class Platform(NamedTuple):
 
         Such a path depends on a file or on the position of the scene on the Earth.
         """
-        return self.way in ("orbit", "trajectory", "latitude")
+        return self.way in (*FLOWN_SECTIONS, "latitude")
 
     @property
     def state(self) -> PlatformState:

@@ -12,12 +12,13 @@ import numpy as np
 from bisar_budget import units
 from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import EARTH_RADIUS_M
+from bisar_budget.error_kinds.random_kinds import PROPAGATION_KIND
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import PlatformState, Vectors
 from bisar_budget.mission.platforms import Platforms
 from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, Source
 
-DELAYS = ("zenith_delay", "zenith_electron_content")
+DELAYS = tuple(PROPAGATION_KIND.sizes)
 _CORRELATION_TIME_KEY = "correlation_time"
 LEAST_ELEVATION_DEG = 3.0  # at lower elevations, the zenith delay does not determine the slant delay
 AIR_TOP_M = 80e3  # few free electrons are below this height, and little air is above it
@@ -145,7 +146,7 @@ class Propagation(NamedTuple):
 
     def path(self, platform: str, delay: str) -> KeyPath:
         """Path of the key that states a `delay`, such as `zenith_delay`, for the leg of a platform."""
-        return ("propagation", *(() if self.is_one_air else (platform,)), delay)
+        return PROPAGATION_KIND.path("mission" if self.is_one_air else platform, delay)
 
 
 PROPAGATION = Section(Propagation)

@@ -14,6 +14,7 @@ import numpy as np
 
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.faults import Fault, InvalidValueError, Problem, SetValue, fault_words, printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.json_types import JsonObject
@@ -339,7 +340,8 @@ _OMITTED_SECTIONS: Mapping[str, Callable[[], object]] = {
     "common_motion_error": CommonMotionError,
     "simulation": Simulation,
 }
-_TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
+_STATE_NAMES = tuple(kind.name for kind in STATE_KINDS)
+_TRIPLES = (*_STATE_NAMES, *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
 _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
@@ -429,7 +431,7 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
     if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
-    if isinstance(value, MotionError) and name in ("position", "velocity", "acceleration"):
+    if isinstance(value, MotionError) and name in _STATE_NAMES:
         return _value_below(value.stated(name), remaining)
     return _value_below(getattr(value, POWERS.get(name, name)), remaining)
 

@@ -16,7 +16,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, NamedTuple, TypeGuard, TypeVar
 
 from bisar_budget import units
-from bisar_budget.error_kinds import MotionKind, entry_point_faults, motion_kind, motion_kinds
+from bisar_budget.error_kinds.registry import MotionKind, entry_point_faults, motion_kind, motion_kinds
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem, sentences
 from bisar_budget.json_types import Definitions, JsonObject
 from bisar_budget.resources import docstring

@@ -17,12 +17,12 @@ NAVIGATION_SENTENCES: dict[str, str] = {
         "aperture, or fixes"
     ),
     "sensor-runs-free": (
-        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make a "
-        "QPE of {free:rad}; if GNSS aids the sensor, use navigation"
+        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make "
+        "a QPE of {free:rad}; if GNSS aids the sensor, use navigation"
     ),
     "sensor-runs-free-not-aided": (
-        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make a "
-        "QPE of {free:rad}; aided by the GNSS receiver, with {rate:g} fix a second and smoothed, they leave "
+        "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make "
+        "a QPE of {free:rad}; aided by the GNSS receiver, with {rate:g} fix a second and smoothed, they leave "
         "{aided:rad}: use navigation"
     ),
     "position-and-velocity-contradict": (

@@ -43,7 +43,9 @@ import numpy as np
 
 from bisar_budget import image_plane
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
-from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
+from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
+from bisar_budget.error_kinds.clock_kinds import clock_range_error
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.geometry import GroundVector, PlatformState, VectorArrays, Vectors, dot, norm
 from bisar_budget.image_plane import FEWEST_PATH_NODES, GroundMatrix, Sampling, band_variance, nodes
 
@@ -540,20 +542,13 @@ class ExactRanges:
 
     # ------------------------------------------------------------------ small errors
     @cached_property
-    def powers(self) -> dict[str, Floats]:
-        """Position error at the nodes for one unit of each coefficient of the error polynomial (22), (nodes, n).
-
-        The keys are the units of the coefficients: `m` for the factor of 1, `m/s` for that of τ, and `m/s^2` for
-        that of τ²/2.
-        """
-        return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
+    def powers(self) -> tuple[Floats, ...]:
+        """Position error at the nodes per unit of a position, velocity and acceleration error, (nodes, n) each."""
+        return tuple(kind.course(self.times) for kind in STATE_KINDS)
 
     def clock_course(self, terms: Sequence[PerCase]) -> Floats:
         """Range error at the nodes for a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`. [m]"""
-        seconds = np.zeros_like(self.times)
-        for term in reversed(terms):
-            seconds = seconds * self.times + term
-        return SPEED_OF_LIGHT_MPS * seconds
+        return clock_range_error(terms, self.times)
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Range error at the nodes per metre of position error of a platform along a direction, (nodes, n). [m/m]

@@ -21,6 +21,7 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.together import Together, cubics
 from bisar_budget.constants import MAX_DRAWS
+from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.effects.random_effect import RandomError
@@ -169,16 +170,16 @@ def _requirements(
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
-    owners_by_name = {
+    owners_by_share = {
         "transmitter": ("transmitter",),
         "receiver": ("receiver",) if allocation.qpe.clock is not None else ("receiver", "clock"),
-        "timing": ("clock",) if allocation.qpe.clock is not None else (),
+        "clock": ("clock",) if allocation.qpe.clock is not None else (),
         "mission": every,
     }
-    for name, owners in owners_by_name.items():
+    for owner, owners in owners_by_share.items():
         if present.intersection(owners):
-            limit = allocation.qpe_allowed("clock" if name == "timing" else name)
-            yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,), allocation.autofocus_gain)
+            limit = allocation.qpe_allowed(owner)
+            yield HeldSum(subject(owner, QUADRATIC).id, "rad", limit, owners, (0,), allocation.autofocus_gain)
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
     displaces = moves or any(variable.effects[2] or variable.effects[3] for variable in variables)

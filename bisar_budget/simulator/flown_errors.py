@@ -1,11 +1,14 @@
 """Conversion of the errors of a mission to the path and clock errors that the simulator applies to an image."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.registry import MotionKind
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, Vectors, plain_vector
 from bisar_budget.simulator.phase_history import Course, Errors, PathError, superposed
 
 _MOTION_SAMPLES = 513  # of the smooth motion that a registered kind states
@@ -29,21 +32,31 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
         return Errors(clock=tuple(size * float(term) for term in source.clock))
     errors = Errors()
     for platform_index in source.platforms:
-        if source.motion is not None:
-            times = np.linspace(-aperture_time_s / 2, aperture_time_s / 2, _MOTION_SAMPLES)
-            motion = source.motion(geometry.both[platform_index], times)
-            error = PathError(course=Course(times, size * motion.T))
-        elif source.kind.flown_as == "time_tag":
-            error = PathError(time_tag=size)
-        elif source.kind.flown_as == "height":
-            error = PathError(height=size)
-        else:
-            position, velocity, acceleration = (
-                (size * x, size * y, size * z) for x, y, z in source.state_of(platform_index)
-            )
-            error = PathError(position, velocity, acceleration)
-        errors = errors.of(PLATFORMS[platform_index], error)
+        path_error = _path_error(source, size, platform_index, geometry.both[platform_index], aperture_time_s)
+        errors = errors.of(PLATFORMS[platform_index], path_error)
     return errors
+
+
+def _path_error(
+    source: ErrorSource, size: float, platform_index: int, path: PlatformState, aperture_time_s: float
+) -> PathError:
+    """Convert an error to the error of the path of one platform, in the field that the kind of the error names."""
+    kind, fields = source.kind, dict[str, Any]()
+    if isinstance(kind, MotionKind):
+        times = np.linspace(-aperture_time_s / 2, aperture_time_s / 2, _MOTION_SAMPLES)
+        fields = {kind.flown_as: Course(times, size * np.array(kind.moved(path, times)).T)}
+    elif isinstance(kind, StateKind):
+        fields = {kind.flown_as: _times(size, source.direction_of(platform_index))}
+        if source.rates is not None:
+            fields["velocity"] = _times(size, source.rates[platform_index])
+    else:
+        fields = {kind.flown_as: size}
+    return PathError(**fields)
+
+
+def _times(size: float, vector: Vectors) -> Vector:
+    x, y, z = plain_vector(vector)
+    return size * x, size * y, size * z
 
 
 def flown_together(

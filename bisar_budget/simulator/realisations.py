@@ -17,8 +17,6 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.air_delays import CONTENT, DELAY, correlation_time_of, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
-    INERTIAL_FIGURES,
-    InertialFigure,
     acceleration_errors,
     arm_at,
     body_axes,
@@ -38,6 +36,7 @@ from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
 from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted, pieces_of_vibration
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES, InertialFigure
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
@@ -194,10 +193,10 @@ def _drawn_by_axis(
     Yields the index of the axis, the position error, (draws, times), and the tilt, (draws, times). The position error
     assumes that an error of 1 causes an acceleration of 1. An axis without an error is omitted.
     """
-    _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.name, None) or (1.0, 1.0, 1.0)))
+    _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.key, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
         if size:
-            pushed, tilted = _INERTIAL_DRAWS[figure.name](times, draws, rng)
+            pushed, tilted = _INERTIAL_DRAWS[figure.key](times, draws, rng)
             yield axis, size * pushed, size * tilted
 
 

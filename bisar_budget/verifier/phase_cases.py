@@ -5,9 +5,10 @@ import math
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
 from bisar_budget.effects.declared import CUBIC
-from bisar_budget.effects.effect import ErrorSource, Subject
+from bisar_budget.effects.effect import ErrorSource, Subject, subject
 from bisar_budget.effects.slow_tones import TONE_PHASE_COUNT
 from bisar_budget.effects.vibration import lines_of, unit_of_line
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
@@ -207,7 +208,8 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # range error λN/2 divided by the range cell c/B
     blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
-    clock = next(s for s in study.sources if s.id == "timing.quadratic")
+    row_subject = subject("clock", TIMING_KIND.name, "quadratic")
+    clock = next(source for source in study.sources if source.subject == row_subject)
     fields = refocused(study, [(clock, phase / abs(float(clock.effect.qpe)))], budget, holds_hidden=False)
     reason = phrases.note("range-walk", cells=walk, n_pull=range_walk_cap(study.mission))
     return blank._replace(boundary_autofocus=phase, **fields, verdict=fields["verdict_autofocus"], reason=reason)

@@ -6,9 +6,16 @@ The values are written as a mission file writes them. A platform's keys are thos
 import copy
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
+import bisar_budget as bb
+from bisar_budget import units
+from bisar_budget.error_kinds import registry
+from bisar_budget.mission.changes import all_keys
 from bisar_budget.mission.model import mission_schema
 
 Document = dict[str, Any]
@@ -61,7 +68,33 @@ class ErrorKey(NamedTuple):
     instead: Any = None
 
 
+def drift_north(path: object, times: np.ndarray) -> np.ndarray:
+    """Motion of a registered kind of error: a drift to the north. [m per m/s]"""
+    return np.stack([0 * times, times, 0 * times])
+
+
+REGISTERED_KIND = bb.MotionKind(
+    name="drift_north",
+    dimension=units.SPEED,
+    description="Drift of the phase centre to the north.",
+    motion=drift_north,
+)
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """Register the kind of error of the key `registered` for a while."""
+    before = dict(registry._KINDS)
+    bb.register(REGISTERED_KIND)
+    all_keys.cache_clear()
+    yield
+    registry._KINDS.clear()
+    registry._KINDS.update(before)
+    all_keys.cache_clear()
+
+
 ERROR, COMMON = f"{RECEIVER}motion_error.", "common_motion_error."
+REGISTERED = f"{ERROR}registered.{REGISTERED_KIND.name}"
 OSCILLATOR, VIBRATION = f"{RECEIVER}oscillator.", f"{RECEIVER}motion_error.vibration."
 LIGHT = {f"{ERROR}imu.attitude": "0.1 deg"}
 RANDOM = {f"{ERROR}random.0.name": "GNSS"}
@@ -83,6 +116,23 @@ HOLDOVER = {
     "synchronization.time_error": "1 ns",
     "synchronization.frequency_error": 1e-12,
 }
+# A poor inertial unit, and a short flight: every figure of an aided navigation has an effect.
+NAVIGATION = f"{ERROR}navigation."
+UNIT = {
+    f"{NAVIGATION}imu.accelerometer_bias": "30 mg",
+    f"{NAVIGATION}imu.gyro_bias": "2000 deg/h",
+    f"{NAVIGATION}imu.velocity_random_walk": "0.3 m/s/sqrt(h)",
+    f"{NAVIGATION}imu.angle_random_walk": "3 deg/sqrt(h)",
+}
+FIXES = {
+    f"{NAVIGATION}gnss.rate": "1 Hz",
+    f"{NAVIGATION}gnss.position": "5 cm",
+    f"{NAVIGATION}gnss.velocity": "10 cm/s",
+    f"{NAVIGATION}before": "3 s",
+    f"{NAVIGATION}after": "3 s",
+}
+AIDED = {**UNIT, **FIXES}
+OUTAGE = {**AIDED, f"{NAVIGATION}outages.0.from": "-1.2 s", f"{NAVIGATION}outages.0.to": "1.2 s"}
 LINK = {**CLOCKS, "synchronization.interval": "0.5 s"}
 
 # Aircraft are below the free electrons of the air.
@@ -159,6 +209,40 @@ ERROR_KEYS: dict[str, ErrorKey] = {
     f"{ERROR}random.correlation_time": ErrorKey(
         "1.5 s", "3 s", "receiver.random.GNSS", {**RANDOM, f"{ERROR}random.0.sigma": "3 mm"}, instead="30 s"
     ),
+    **{
+        f"{NAVIGATION}{key}": ErrorKey(value, larger, "receiver.navigation", beside, instead=instead)
+        for key, value, larger, beside, instead in (
+            ("imu.sensor", "adis16405", "mti-g", FIXES, "stim300"),
+            ("imu.accelerometer_bias", "30 mg", "60 mg", AIDED, "1 mg"),
+            ("imu.gyro_bias", "2000 deg/h", "8000 deg/h", AIDED, "1 deg/h"),
+            ("imu.velocity_random_walk", "0.3 m/s/sqrt(h)", "1 m/s/sqrt(h)", AIDED, "0.01 m/s/sqrt(h)"),
+            ("imu.angle_random_walk", "3 deg/sqrt(h)", "10 deg/sqrt(h)", AIDED, "0.1 deg/sqrt(h)"),
+            (
+                "gnss.sensor",
+                "mosaic-x5-standalone",
+                "gps18x-5hz",
+                {**UNIT, f"{NAVIGATION}gnss.rate": "1 Hz"},
+                "mosaic-x5-rtk",
+            ),
+            ("gnss.rate", "1 Hz", "0.5 Hz", AIDED, "10 Hz"),
+            ("gnss.position", "5 cm", "20 cm", AIDED, "5 mm"),
+            ("method", "filtered", "filtered", {**UNIT, **FIXES, f"{NAVIGATION}after": "0 s"}, "smoothed"),
+            ("before", "0 s", "0 s", AIDED, "10 s"),
+            ("after", "0 s", "0 s", AIDED, "10 s"),
+        )
+    },
+    **{
+        f"{NAVIGATION}{key}": ErrorKey(value, larger, "receiver.navigation", beside)
+        for key, value, larger, beside in (
+            ("imu.accelerometer_scale_factor", "20000 ppm", "50000 ppm", AIDED),
+            ("gnss.velocity", "1 cm/s", "0.5 cm/s", AIDED),
+            ("gnss.correlation_time", "10 s", "30 s", AIDED),
+            ("heading", "40 deg", "80 deg", AIDED),
+            ("level", "6 dB", "12 dB", AIDED),
+        )
+    },
+    f"{NAVIGATION}outages.from": ErrorKey("-1.2 s", "-1.4 s", "receiver.navigation", OUTAGE, instead="1.1 s"),
+    f"{NAVIGATION}outages.to": ErrorKey("1.2 s", "1.4 s", "receiver.navigation", OUTAGE, instead="-1.1 s"),
     f"{ERROR}time_tag": ErrorKey("1 ms", "2 ms", "receiver.time_tag"),
     f"{ERROR}lever_arm.arm": ErrorKey(["10 m", 0, "5 m"], ["20 m", 0, "5 m"], "receiver.lever_arm.attitude", LIGHT),
     f"{ERROR}lever_arm.uncertainty": ErrorKey("1 m", "2 m", "receiver.lever_arm.uncertainty"),
@@ -264,6 +348,7 @@ ERROR_KEYS: dict[str, ErrorKey] = {
     ),
     "other_errors.location_error": ErrorKey("5 m", "10 m", "other.antenna.location_error", ANTENNA, "other_errors"),
     "other_errors.islr": ErrorKey("-30 dB", "-20 dB", "other.antenna.islr", ANTENNA, "other_errors"),
+    REGISTERED: ErrorKey("5 cm/s", "10 cm/s", f"receiver.{REGISTERED_KIND.name}"),
 }
 
 # Keys that describe an error: which of them changes nothing that is computed is said beside it.
@@ -280,6 +365,9 @@ DESCRIBING_KEYS: dict[str, tuple[Document, Any, Any]] = {
         None,
     ),
     f"{ERROR}imu.source": ({f"{ERROR}imu.gyro_bias": "20 deg/h"}, "report", None),
+    f"{NAVIGATION}source": (AIDED, "report", None),
+    f"{NAVIGATION}imu.source": (AIDED, "report", None),
+    f"{NAVIGATION}gnss.source": (AIDED, "report", None),
     f"{ERROR}lever_arm.source": ({f"{ERROR}lever_arm.uncertainty": "1 m"}, "report", None),
     f"{OSCILLATOR}source": (NOISY, "report", None),
     f"{COMMON}frame": (_SHARED, "track", None),
@@ -303,7 +391,7 @@ DESCRIBING_KEYS: dict[str, tuple[Document, Any, Any]] = {
 # ---------------------------------------------------------------------- missions with a key and without it
 def path_of(key: str) -> str:
     """Path of a key in a mission file, in the first entry of each list."""
-    return re.sub(r"\b(random|sinusoidal|other_errors)\.(?=[a-z])", r"\1.0.", key)
+    return re.sub(r"\b(random|sinusoidal|other_errors|outages)\.(?=[a-z])", r"\1.0.", key)
 
 
 def number_in(key: str) -> tuple[str, Any, Any]:

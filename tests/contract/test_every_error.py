@@ -8,7 +8,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from tests.contract.error_keys import (
     ERROR_KEYS,
     OSCILLATOR,
     RECEIVER,
+    REGISTERED,
     Document,
     keys_of_the_model,
     mission_with,
@@ -37,6 +38,7 @@ from tests.contract.error_keys import (
     mission_without_key,
     number_in,
     path_of,
+    registered,
 )
 
 KEYS = pytest.mark.parametrize("key", ERROR_KEYS)
@@ -59,6 +61,13 @@ BESIDE_OTHERS = (
 )
 DEVIATIONS = 5  # standard deviations by which a drawn rms may differ from its expectation
 LAST_FIRST_LINE = "displacement"  # of the summary of `simulate`: what it flies is said above this line
+
+
+@pytest.fixture(autouse=True, scope="module")
+def own_kind() -> Iterator[None]:
+    """The kind of error of the key `registered` is there during these tests."""
+    with registered():
+        yield
 
 
 def a_few(step: int, *always: str) -> list[Any]:
@@ -146,7 +155,7 @@ def kind_of(key: str) -> str:
     """Kind of the error of a key, as `requirements.declare` names it."""
     parts = key.split(".")
     if parts[0] == "platforms":
-        kind = "oscillator" if parts[2] == "oscillator" else parts[3]
+        kind = "oscillator" if parts[2] == "oscillator" else parts[-1] if "registered" in parts else parts[3]
         if kind == "covariance":
             kind = "velocity" if parts[-1] == "velocity" else "position"
         return f"receiver.{'imu' if kind == 'sensor' else kind}"
@@ -175,7 +184,7 @@ def test_sweep_varies_the_key(key: str) -> None:
     assert first != second
 
 
-@pytest.mark.parametrize("key", a_few(4))
+@pytest.mark.parametrize("key", a_few(4, REGISTERED))
 def test_solve_takes_the_key_or_says_what_it_takes(key: str, tmp_path: Path) -> None:
     file = written(tmp_path, "mission.yaml", mission_with_key(key))
     answers_or_says_what_it_takes(CliRunner(**APART).invoke(cli, ["solve", file, "--for", path_of(key)]), key)
@@ -196,7 +205,7 @@ def test_sensitivity_ranks_the_number(key: str) -> None:
     assert path_of(key) in json.dumps(effects)
 
 
-@pytest.mark.parametrize("key", a_few(2))
+@pytest.mark.parametrize("key", a_few(2, REGISTERED))
 def test_allocate_specifies_the_key_or_says_what_it_specifies(key: str, tmp_path: Path) -> None:
     file = written(tmp_path, "mission.yaml", mission_with_key(key))
     answers_or_says_what_it_takes(CliRunner(**APART).invoke(cli, ["allocate", file, "--for", path_of(key)]), key)
@@ -282,7 +291,7 @@ def header_names(key: str) -> tuple[str, ...]:
     return elements.get(row, row), row.rpartition(".")[0] if row.split(".")[1] == "acceleration" else row
 
 
-@pytest.mark.parametrize("key", a_few(24, f"{OSCILLATOR}spurs", "other_errors.islr"))
+@pytest.mark.parametrize("key", a_few(24, f"{OSCILLATOR}spurs", "other_errors.islr", REGISTERED))
 def test_the_image_has_the_error(key: str) -> None:
     """As the phase history; an image that cannot be formed says why."""
     try:
@@ -297,7 +306,7 @@ def test_the_image_has_the_error(key: str) -> None:
         assert is_left_out(ERROR_KEYS[key].row, first_lines)
 
 
-@pytest.mark.parametrize("key", a_few(24))
+@pytest.mark.parametrize("key", a_few(24, REGISTERED))
 def test_verify_forms_images_of_the_row_or_says_why_not(key: str) -> None:
     try:
         (verdict,) = bb.verify(loaded(mission_with_key(key)), ERROR_KEYS[key].row, jobs=1).rows

@@ -3,16 +3,18 @@
 from collections.abc import Iterable
 
 from bisar_budget.budget.random_rows import RANDOM_WORDINGS, REASONS_FOR_NO_EFFECT
-from bisar_budget.effects import navigation_errors, sources
-from bisar_budget.error_kinds import STATE_KINDS, ErrorKind, SourceKind, StateKind, SumKind, kinds
+from bisar_budget.effects import navigation_errors
+from bisar_budget.error_kinds.kind import ErrorKind, SourceKind, SumKind
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
+from bisar_budget.error_kinds.registry import kinds
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import SPECIFICATION
 from bisar_budget.mission.instruments import IMU_KINDS
 from bisar_budget.report.compliance.rows import LIMIT_FORMS
-from bisar_budget.report.explain.explained_error import CLOCK_TERMS
+from bisar_budget.report.explain.explained_error import SOURCE_STEPS
 from bisar_budget.report.explain.explained_random import RANDOM_STEPS
 from bisar_budget.report.explain.explanation import ROW_STEPS
-from bisar_budget.report.explain.notation import STATE_LETTERS
 from bisar_budget.simulator import realisations
 from bisar_budget.verifier import spread_cases
 
@@ -33,10 +35,9 @@ def test_limit_forms() -> None:
     assert set(LIMIT_FORMS) == names(SUMS) - set(REQUIREMENT_NAMES) - {SPECIFICATION}
 
 
-def test_clock_terms() -> None:
-    """A clock error that is neither random nor a term of the clock error itself has its terms."""
-    clocks = names(kind for kind in SOURCES if kind.moves == "clock" and not kind.is_random)
-    assert set(CLOCK_TERMS) == clocks - {"timing"} | {"oscillator.aging"}
+def test_source_steps() -> None:
+    """A kind of error that is not random has steps, and so has the aging of an oscillator."""
+    assert set(SOURCE_STEPS) == names(kind for kind in SOURCES if not kind.is_random) | {"oscillator"}
 
 
 def test_random_steps() -> None:
@@ -55,11 +56,6 @@ def test_wordings_and_reasons_for_no_effect() -> None:
 def test_row_steps() -> None:
     """A sum has steps, and so has an error that is judged by its tones, its power or its log."""
     assert set(ROW_STEPS) == names(SUMS) | APART
-
-
-def test_state_letters() -> None:
-    """An error of position, velocity or acceleration has a letter."""
-    assert set(STATE_LETTERS) == names(kind for kind in SOURCES if isinstance(kind, StateKind))
 
 
 def test_an_entry_for_an_axis_comes_before_that_of_the_kind() -> None:
@@ -88,13 +84,9 @@ def test_every_random_kind_is_drawn() -> None:
     assert {kind.drawn_as for kind in RANDOM} == {"motion", "delay", "phase"}
 
 
-def test_defocusing_vectors() -> None:
-    assert list(sources._DEFOCUSING_VECTORS) == [kind.name for kind in STATE_KINDS if kind.order > 0]
-
-
 def test_inertial_figures() -> None:
     """In the order of the file's keys, which is that of the evaluator."""
-    assert tuple(navigation_errors.INERTIAL_FIGURES) == IMU_KINDS
+    assert tuple(INERTIAL_FIGURES) == IMU_KINDS
 
 
 def test_processes() -> None:

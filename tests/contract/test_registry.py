@@ -11,10 +11,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 import bisar_budget as bb
-from bisar_budget import error_kinds, units
+from bisar_budget import units
 from bisar_budget.cli import cli
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds import SourceKind, kind_of, kinds
+from bisar_budget.error_kinds import registry
+from bisar_budget.error_kinds.kind import SourceKind
+from bisar_budget.error_kinds.random_kinds import PROPAGATION_KIND
+from bisar_budget.error_kinds.registry import kind_of, kinds
 from bisar_budget.faults import MotionKindError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import all_keys
@@ -51,7 +54,7 @@ IDS = {
 @pytest.fixture(autouse=True)
 def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinds that a test registers are gone after it."""
-    monkeypatch.setattr(error_kinds, "_KINDS", dict(error_kinds._KINDS))
+    monkeypatch.setattr(registry, "_KINDS", dict(registry._KINDS))
 
 
 def still(path: object, times: np.ndarray) -> np.ndarray:
@@ -97,7 +100,7 @@ def test_a_name_with_another_meaning_is_refused(name: str) -> None:
         kind(name)
 
 
-OTHER_FACTS = sorted({each.name for each in fields(SourceKind)} - {"name"})
+OTHER_FACTS = sorted({each.name for each in fields(SourceKind)} - {"name", "description"})
 
 
 @pytest.mark.parametrize("fact", OTHER_FACTS)
@@ -110,7 +113,7 @@ def test_the_motion_says_everything_about_a_registered_kind(fact: str) -> None:
 def test_nothing_but_a_motion_is_registered() -> None:
     """A kind without a motion was accepted, and no command knew it."""
     with pytest.raises(TypeError, match="MotionKind"):
-        bb.register(SourceKind(name="leak", moves="air"))
+        bb.register(PROPAGATION_KIND)
 
 
 def test_a_kind_that_moves_nothing_passes_without_a_limit() -> None:
@@ -289,9 +292,9 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
         (metadata / "entry_points.txt").write_text(f"[bisar_budget.kinds]\n{name} = e54_{name}:KIND\n")
         monkeypatch.delitem(sys.modules, f"e54_{name}", raising=False)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(error_kinds, "_ENTRY_POINT_FAULTS", [])
-    monkeypatch.setattr(error_kinds, "_DISTRIBUTIONS", {})
-    caches = (error_kinds._read_entry_points, all_keys)
+    monkeypatch.setattr(registry, "_ENTRY_POINT_FAULTS", [])
+    monkeypatch.setattr(registry, "_DISTRIBUTIONS", {})
+    caches = (registry._read_entry_points, all_keys)
     for cache in caches:
         cache.cache_clear()
     yield tmp_path

@@ -12,7 +12,7 @@ import pytest
 import bisar_budget as bb
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
-from bisar_budget.error_kinds import POSITION_KIND
+from bisar_budget.error_kinds.path_kinds import POSITION_KIND
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.simulator.phase_history import PathError, path

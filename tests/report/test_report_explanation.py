@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
@@ -35,7 +36,7 @@ def test_table_1_is_what_the_derivation_prints() -> None:
     ours = {notation.clock_coefficient(order) for order in range(4)}
     for platform in ("transmitter", "receiver"):
         for number, row in enumerate([row for row in rows if f"_{platform[0]}(" in row[1]]):
-            kind, axis = ("position", "velocity", "acceleration")[number % 3], "xyz"[number // 3]
+            kind, axis = STATE_KINDS[number % 3], "xyz"[number // 3]
             texts = notation.motion_coefficients(kind, axis, platform)
             assert [texts.get(order, "-") for order in range(4)] == row[2:6]
             ours |= set(texts.values())
@@ -47,7 +48,7 @@ def test_table_2_is_what_the_derivation_prints() -> None:
     ours = [
         notation.motion_phase(kind, axis, platform)
         for platform in ("transmitter", "receiver")
-        for kind in ("velocity", "acceleration")
+        for kind in STATE_KINDS[1:]
         for axis in "xyz"
     ]
     assert [*ours, notation.CLOCK_PHASE] == printed

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds import StateKind, SumKind, names_of_named_kinds
+from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.registry import names_of_named_kinds
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import Mission, Requirements, Waiver
+from bisar_budget.mission.model import OF_MISSION, Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
 from bisar_budget.mission.readers import SectionValue
 from bisar_budget.report.change.fallen_effects import fallen_effects
@@ -208,9 +209,9 @@ def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
 def _owned(word: str) -> list[str]:
     """Kinds of error, such as `receiver.position`, that an entry of `requirements.declare` requires to be declared.
 
-    An entry without a platform, except `timing`, stands for this kind of error on both platforms.
+    An entry without a platform stands for this kind of error on both platforms, if it belongs to a platform.
     """
-    return [word] if "." in word or word == "timing" else [f"{name}.{word}" for name in PLATFORMS]
+    return [word] if "." in word or word in OF_MISSION else [f"{name}.{word}" for name in PLATFORMS]
 
 
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
@@ -293,8 +294,7 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
 
 def _is_sum(row: Row) -> bool:
     """Whether a row sums the effects of several errors, so that it is not an error itself."""
-    kind = row.subject.facts
-    return isinstance(kind, SumKind) and kind.is_sum
+    return row.subject.facts.is_sum
 
 
 def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:

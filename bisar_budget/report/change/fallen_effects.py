@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds import SourceKind, StateKind, SumKind
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import SPECIFICATION, Row
@@ -166,7 +166,7 @@ def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
     rows = []
     for row in findings.rows:
         subject = row.subject
-        if row.declared is None or isinstance(subject.facts, SumKind):
+        if row.declared is None or not subject.facts.is_source:
             continue
         is_of_platform = isinstance(subject.facts, StateKind) and row.owner in PLATFORMS
         if is_of_platform and row.is_independent == ((row.owner, subject.kind) in elsewhere):
@@ -180,7 +180,7 @@ def _sums(findings: MissionFindings) -> list[Row]:
     return [
         row
         for row in findings.rows
-        if isinstance(row.subject.facts, SumKind) and row.metric != SPECIFICATION and row.declared is not None
+        if not row.subject.facts.is_source and row.metric != SPECIFICATION and row.declared is not None
     ]
 
 
@@ -258,8 +258,7 @@ def _source(mission: Mission, row: Row) -> str:
 
     For a row about the fixes of a trajectory log, it is the name of the log file.
     """
-    kind = row.subject.facts
-    if not (isinstance(kind, SourceKind) and kind.is_of_log):
+    if not row.subject.facts.is_of_log:
         return plain(row.evidence)
     path: FlownPath | None = getattr(mission.platforms, row.owner).path
     return plain_file(path and path.file)
@@ -276,9 +275,7 @@ def _is_named(source: str, mission: Mission, row: Row) -> bool:
     if row.owner not in PLATFORMS:
         return False
     platform: Platform = getattr(mission.platforms, row.owner)
-    kind = row.subject.facts
-    is_of_clock = isinstance(kind, SourceKind) and kind.moves == "clock"
-    section = platform.oscillator if is_of_clock else platform.motion_error
+    section = platform.oscillator if row.subject.facts.moves == "clock" else platform.motion_error
     if section is None:
         return False
     overridden = [plain(override.part) for override in section.overridden]

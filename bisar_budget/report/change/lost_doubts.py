@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from bisar_budget.budget.doubts import InputDoubt, input_doubts
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import SMOOTHED, FlownPath, Platform
+from bisar_budget.mission.platforms import FLOWN_SECTIONS, SMOOTHED, FlownPath, Platform
 from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.units import format_quantity
 
@@ -61,7 +61,7 @@ def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[st
     was, now = old.path, new.path
     if was is None:
         return
-    if now is None or new.way not in ("orbit", "trajectory"):
+    if now is None or new.way not in FLOWN_SECTIONS:
         yield old.way, "path stated without a source"
     elif now.is_planned and not was.is_planned and not doubt.is_stated:
         yield "orbit.planned", "true"

@@ -12,7 +12,6 @@ import numpy as np
 
 from bisar_budget.arrays import NumbersOrWords
 from bisar_budget.catalogue import EQUATIONS
-from bisar_budget.error_kinds import SourceKind
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings
@@ -330,7 +329,7 @@ def sources(findings: MissionFindings) -> tuple[dict[str, list[str]], list[str]]
             continue
         if row.evidence:
             by_source.setdefault(row.evidence, []).append(row.id)
-        elif isinstance(row.subject.facts, SourceKind) and row.subject.facts.owes_source:
+        elif row.subject.facts.owes_source:
             unsourced.append(row.id)
     return by_source, unsourced
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.effect import Subject, plain
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
@@ -263,9 +263,7 @@ class Contribution:
     @property
     def kind(self) -> SourceKind:
         """The kind of the error."""
-        kind = self.subject.facts
-        assert isinstance(kind, SourceKind)
-        return kind
+        return self.subject.source_kind
 
     @property
     def owner(self) -> str:

@@ -6,8 +6,7 @@ from shlex import quote
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.effects.effect import MOTION_UNITS
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
@@ -534,7 +533,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     yield "Declared", f"for position, velocity, acceleration and clock {factor}"
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
-        if any(error.stated(kind) for kind in MOTION_UNITS):
+        if any(error.stated(kind.name) for kind in STATE_KINDS):
             text = _DISTRIBUTION_WORDS[error.distribution]
             text += ", position and velocity by their covariance" if error.covariance is not None else ""
             yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {text}"
@@ -586,9 +585,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "there are no free electrons; above, the leg crosses spherical shells at 7 km and 350 km",
         )
     for row in findings.rows:
-        kind = row.subject.facts
-        is_of_clock = isinstance(kind, SourceKind) and kind.moves == "clock"
-        if is_of_clock and row.owner in Platforms._fields and row.remarks:
+        if row.subject.facts.moves == "clock" and row.owner in Platforms._fields and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 

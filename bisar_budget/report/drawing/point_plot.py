@@ -16,6 +16,7 @@ import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_tones import spurs_of
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND
 from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.findings.images import CHIP_FLOOR_DB
 from bisar_budget.mission.model import OTHER_EFFECTS, Mission, Simulation, has_instruments
@@ -420,7 +421,7 @@ def _stated_effect_words(mission: Mission) -> str:
     row_ids = {effect: list[str]() for effect in OTHER_EFFECTS}
     for stated in mission.other_errors:
         for row_id in stated.stated:
-            effect = row_id.removeprefix(f"other.{stated.name}").lstrip(".")
+            effect = row_id.removeprefix(OTHER_KIND.row_id("mission", stated.name)).lstrip(".")
             row_ids[effect or OTHER_EFFECTS[0]].append(row_id)
     flown = []
     for way, effects in ways.items():

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +10,9 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource, subject
-from bisar_budget.error_kinds import MotionKind, SourceKind, StateKind
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND, ClockKind
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState, plain_vector
@@ -32,27 +32,18 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     yield from stated(mission, source.path, source.declared, source.evidence)
     if source.declared is None:
         return
-    platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
-    k = mission.allocation.coverage_factor
-    if source.clock is not None or source.is_registered:
-        value = source.declared / k
-    elif source.is_time_tag:
-        owner = mission.common_motion_error if source.is_common else getattr(mission.platforms, platform).motion_error
-        value = getattr(owner, kind)
-    elif platform in PLATFORMS:
-        error = getattr(mission.platforms, platform).motion_error
-        values = error.stated(kind)
-        if error.frame != "scene" and axis in notation.AXIS_LETTERS:
-            yield from _rotated_declaration(mission, source, axis)
-            return
-        if error.covariance is not None and error.covariance.is_matrix and source.kind.has_covariance:
+    if not source.is_covered:
+        return
+    if not source.is_independent:
+        yield from _rotated_declaration(mission, source, source.subject.axis)
+        return
+    if source.kind.has_covariance and source.owner in PLATFORMS:
+        covariance = getattr(mission.platforms, source.owner).motion_error.covariance
+        if covariance is not None and covariance.is_matrix:
             yield step("One sigma is the root of the variance")
-        value = values[FRAME_AXES[error.frame].index(axis)]
-    elif source.is_common:
-        value = getattr(mission.common_motion_error, kind)[FRAME_AXES[source.subject.frame].index(axis)]
-    else:
-        return  # an error without an owner has no coverage factor
-    worked = WorkedEquation("declared", "k*|value|", {"k": k, "value": value}, abs(source.declared), source.unit)
+    k = mission.allocation.coverage_factor
+    values = {"k": k, "value": source.declared / k}
+    worked = WorkedEquation("declared", "k*|value|", values, abs(source.declared), source.unit)
     yield step("Coverage factor allocation.coverage_factor", worked)
 
 
@@ -105,37 +96,14 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
-    qpe = abs(float(source.effect.qpe)) * size
-    platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and (source.owner != "mission" or source.is_time_tag):
         unaware = ", which ignores the direct path" if analysis.mission.has_direct_path else ""
         yield step(f"The published model, for comparison{unaware}; the full model, which decides, follows")
-    if not source.is_motion:
-        yield step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
-    elif source.is_time_tag:
-        yield from _time_tag_effect(analysis, source, size, each)
-    elif source.is_registered:
-        yield from _registered_effect(source, size, each)
-    elif source.is_common and source.subject.frame != "scene":
-        yield from _common_projected_effect(analysis, source, size, each)
-    elif source.is_common:
-        yield from _common_effect(analysis, source, signed, each)
-    elif source.owner == "mission":
-        yield step("Published model: a height error moves the image, no quadratic term")
-    elif source.clock is not None:
-        yield from _clock_effect(analysis.mission, source, signed, each)
-    elif axis in notation.AXIS_LETTERS:
-        values = _motion_values(analysis, platform, kind, axis, signed)
-        for order, formula in notation.motion_coefficients(kind, axis, platform).items():
-            result = signed * _coefficient(analysis.mission, source, order)
-            title = f"{_table_i(source.kind, axis)}{each}"
-            yield step(title, WorkedEquation(f"β̃_{order}", formula, values, result, RATES[order]))
-        phase = notation.motion_phase(kind, axis, platform)
-        if phase is not None:
-            yield step(f"{source.equation}{each}", WorkedEquation("QPE", phase, values, qpe, "rad"))
+    if source.is_registered:
+        yield from _registered_effect(analysis, source, signed, each)
     else:
-        yield from _projected_effect(analysis, source, size, each)
+        yield from source.kind.find_in(SOURCE_STEPS)(analysis, source, signed, each)
     if not source.is_motion:
         return
     if gates_by_full:
@@ -156,7 +124,7 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
 
-def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size: float) -> dict[str, float]:
+def _motion_values(analysis: Analysis, platform: str, kind: StateKind, axis: str, size: float) -> dict[str, float]:
     state: PlatformState = getattr(analysis.geometry, platform)
     index, s = notation.AXIS_LETTERS.index(axis), platform[0]
     return {
@@ -169,45 +137,24 @@ def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size
     }
 
 
-@dataclass(frozen=True)
-class _SetClock:
-    """Notation for an error of a clock that was set: its symbol, and formulas for its clock terms t̃₀, t̃₁ and t̃₂.
-
-    In the formulas, H is the time since the clock was set. `direct_title` is the title of the terms if the receiver
-    uses a direct path; it is empty if the title stays the same.
-    """
-
-    symbol: str
-    formulas: tuple[str, ...]
-    direct_title: str = ""
+_TERM_UNITS = tuple(size.unit for size in TIMING_KIND.sizes.values())
 
 
-CLOCK_TERMS = {
-    "time": _SetClock("x", ("x",)),
-    "frequency": _SetClock(
-        "y",
-        ("y*H", "y"),
-        "Terms of the time y·Δt(τ) by which a wrong clock measures the echo behind the direct path wrong",
-    ),
-    "oscillator.aging": _SetClock("D", ("D*H^2/2", "D*H", "D/2")),
-}
-_TERM_UNITS = tuple(CLOCK_UNITS.values())
-
-
-def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    sync, axis = mission.synchronization, source.subject.axis
+def _clock_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    mission, kind = analysis.mission, source.kind
+    assert isinstance(kind, ClockKind)
+    sync, clock = mission.synchronization, kind.clock_size(source.subject.axis)
     values = {
         "c": SPEED_OF_LIGHT_MPS,
         "T": mission.collection.aperture_time,
         "f_0": mission.radar.center_frequency,
     }
-    if axis in CLOCK_UNITS:
-        terms = {tuple(CLOCK_UNITS).index(axis): size}
+    if not clock.symbol:
+        terms = {clock.order: size}
     else:
         terms = {order: size * float(term) for order, term in enumerate(source.clock or ()) if term}
         title = "Terms of the clock error t̃ at mid-aperture"
         lines: list[str | WorkedEquation] = []
-        clock = source.kind.find_in(CLOCK_TERMS, axis)
         if mission.has_direct_path and clock.direct_title:
             title = clock.direct_title
             lines = [f"t̃_{order} = {with_unit(term, _TERM_UNITS[order])}" for order, term in terms.items()]
@@ -230,9 +177,38 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
             yield step(f"{title}{each}", WorkedEquation("QPE", notation.CLOCK_PHASE, known_values, qpe, "rad"))
 
 
-def _table_i(kind: SourceKind, axis: str) -> str:
-    """Label of the row in Table I for a position, velocity or acceleration error along an axis of the scene."""
+def _stated_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    yield step("Quadratic phase error, as declared", f"QPE = {abs(size):.6g} rad")
+
+
+def _height_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    yield step("Published model: a height error moves the image, no quadratic term")
+
+
+def _state_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """Yield the explanation steps for an error of position, velocity or acceleration, in any frame."""
+    axis, platform, kind = source.subject.axis, source.owner, source.kind
     assert isinstance(kind, StateKind)
+    if source.is_common and source.subject.frame != "scene":
+        yield from _common_projected_effect(analysis, source, abs(size), each)
+    elif source.is_common:
+        yield from _common_effect(analysis, source, kind, size, each)
+    elif axis not in notation.AXIS_LETTERS:
+        yield from _projected_effect(analysis, source, abs(size), each)
+    else:
+        values = _motion_values(analysis, platform, kind, axis, size)
+        for order, formula in notation.motion_coefficients(kind, axis, platform).items():
+            result = size * _coefficient(analysis.mission, source, order)
+            title = f"{_table_i(kind, axis)}{each}"
+            yield step(title, WorkedEquation(f"β̃_{order}", formula, values, result, RATES[order]))
+        phase = notation.motion_phase(kind, axis, platform)
+        if phase is not None:
+            qpe = abs(float(source.effect.qpe)) * abs(size)
+            yield step(f"{source.equation}{each}", WorkedEquation("QPE", phase, values, qpe, "rad"))
+
+
+def _table_i(kind: StateKind, axis: str) -> str:
+    """Label of the row in Table I for a position, velocity or acceleration error along an axis of the scene."""
     return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
 
@@ -241,26 +217,26 @@ def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> Error
     return next(source for source in analysis.sources if source.subject == error_subject)
 
 
-def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+def _common_effect(
+    analysis: Analysis, source: ErrorSource, kind: StateKind, size: float, each: str
+) -> Iterator[Step]:
     """Yield the explanation steps for an error that both platforms share.
 
     The phases of both legs add with their signs.
     """
-    _, _, kind, axis, *_ = source.subject
-    has_phase = isinstance(source.kind, StateKind) and source.kind.order > 0
-    values = {}
+    axis, values = source.subject.axis, dict[str, float]()
     for platform in PLATFORMS:
-        leg, phase = _source_of(analysis, platform, kind, axis), f"φ_{platform[0]}"
+        leg, phase = _source_of(analysis, platform, kind.name, axis), f"φ_{platform[0]}"
         values[phase] = float(leg.effect.qpe) * size
         leg_values = _motion_values(analysis, platform, kind, axis, size)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             leg_values[f"β̃_{order}"] = result = size * _coefficient(analysis.mission, leg, order)
-            title = f"{_table_i(source.kind, axis)}, {platform}{each}"
+            title = f"{_table_i(kind, axis)}, {platform}{each}"
             yield step(title, WorkedEquation(f"β̃_{order}", formula, leg_values, result, RATES[order]))
-        if has_phase:
+        if kind.order > 0:
             title = f"Its phase at the aperture edge, {platform}"
             yield step(title, WorkedEquation(phase, notation.EDGE_PHASE, leg_values, values[phase], "rad"))
-    if not has_phase:
+    if kind.order == 0:
         yield step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
     qpe = abs(float(source.effect.qpe) * size)
@@ -272,6 +248,7 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 
     They give its position and velocity errors, and its published phase.
     """
+    size = abs(size)
     for name in (PLATFORMS[index] for index in source.platforms):
         state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
@@ -297,19 +274,33 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
     yield _times_declared(source, size, each)
 
 
-def _registered_effect(source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+def _registered_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps for an error of a registered kind.
 
     They give the description of the kind, and the published phase of the error.
     """
-    assert isinstance(source.kind, MotionKind)
     yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
     unit = f"rad per {source.unit}"
     yield step(
         "Its motion along the line of sight of mid-aperture, its quadratic part",
         f"QPE/unit = {with_unit(float(source.effect.qpe), unit)}",
     )
-    yield _times_declared(source, size, each)
+    yield _times_declared(source, abs(size), each)
+
+
+# Steps of the published model for a signed size, by kind of error.
+SOURCE_STEPS: Mapping[str, Callable[[Analysis, ErrorSource, float, str], Iterator[Step]]] = {
+    "position": _state_effect,
+    "velocity": _state_effect,
+    "acceleration": _state_effect,
+    "time_tag": _time_tag_effect,
+    "terrain": _height_effect,
+    "timing": _clock_effect,
+    "time": _clock_effect,
+    "frequency": _clock_effect,
+    "oscillator": _clock_effect,
+    "other": _stated_effect,
+}
 
 
 def _times_declared(source: ErrorSource, size: float, each: str) -> Step:

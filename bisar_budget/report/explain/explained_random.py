@@ -26,7 +26,6 @@ from bisar_budget.effects.air_delays import (
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
-    INERTIAL_FIGURES,
     arm_at,
     body_axes,
     process_of,
@@ -57,7 +56,7 @@ from bisar_budget.effects.vibration import (
     pieces_of_vibration,
     power_of,
 )
-from bisar_budget.error_kinds import SourceKind
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState, plain_vector
 from bisar_budget.mission.instruments import Synchronization
@@ -77,14 +76,6 @@ from bisar_budget.report.explain.notation import (
     with_unit,
 )
 
-_SYMBOLS = {
-    "accelerometer_bias": "b",
-    "accelerometer_scale_factor": "κ",
-    "attitude": "ψ",
-    "gyro_bias": "ε",
-    "velocity_random_walk": "N",
-    "angle_random_walk": "N_g",
-}
 _PHASE_SYMBOLS = ("QPE", "cubic", "left")
 _PER_SENSITIVITY = "rad per s²/m"
 _MOMENT_FRACTIONS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of half an aperture
@@ -116,9 +107,7 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         worked = WorkedEquation(
             "declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit
         )
-        kind = error.subject.facts
-        is_largest = isinstance(kind, SourceKind) and kind.is_largest_of_axes
-        axes_words = "; of three axes the largest value" if is_largest else ""
+        axes_words = "; of three axes the largest value" if error.kind.is_largest_of_axes else ""
         yield step(f"Coverage factor allocation.coverage_factor{axes_words}", worked)
 
 
@@ -137,7 +126,7 @@ def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     This model keeps the line of sight as it is at mid-aperture.
     """
     mission, figure = analysis.mission, error.subject.axis
-    symbol = _SYMBOLS[figure]
+    symbol = INERTIAL_FIGURES[figure].symbol
     formulas = inertial_phases(symbol)
     unit = error.published
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
@@ -196,9 +185,6 @@ def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     )
 
 
-_TILT_GROWTH = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N_g·W(τ)"}
-
-
 def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the explanation steps for a lever arm.
 
@@ -209,7 +195,7 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     state, motion = platform.state, platform.motion_error
     figure = error.subject.axis
     arm = arm_at(state, motion.lever_arm.arm, np.zeros(1))[:, 0]
-    tilt = _TILT_GROWTH[figure]
+    tilt = INERTIAL_FIGURES[figure].tilt_formula
     yield step(
         f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l as it turns",
         f"l = [{', '.join(with_unit(float(coordinate) + 0.0, 'm') for coordinate in arm)}]",
@@ -315,7 +301,7 @@ def _unit_effect(figure: str, order: int, wavelength: float, T: float) -> float:
     `figure` is the key of the sensor error. `order` selects the quadratic phase (0), the cubic phase (1) or the
     residual (2).
     """
-    row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(figure)]
+    row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(INERTIAL_FIGURES).index(figure)]
     return row[order]
 
 

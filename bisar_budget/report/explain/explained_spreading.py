@@ -32,6 +32,9 @@ from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.vibration import ECHO_CYCLES, cubic_part, quadratic_part
+from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
+from bisar_budget.error_kinds.random_kinds import OTHER_KIND, VIBRATION_KIND
+from bisar_budget.error_kinds.registry import SPREAD_POWER
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
@@ -242,7 +245,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     They give the paired echoes of the spur, and the level that the share of the requirement allows.
     """
     oscillator = getattr(mission.platforms, row.owner).oscillator
-    path = ("platforms", row.owner, "oscillator", "spurs")
+    path = OSCILLATOR_KIND.path(row.owner, row.subject.axis)
     entry = row.subject.entry or 0
     frequency, level = oscillator.spurs[entry]
     yield step(f"Declared in {location(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
@@ -288,10 +291,11 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     tone = next(tone for tone in accelerated_tones(mission) if (tone.name, tone.entry) == (name, entry))
     felt_vibration, f_0 = felt(mission, name), mission.radar.center_frequency
     has_own_vibration = felt_vibration is not None and felt_vibration.is_own
-    section = ("oscillator",) if has_own_vibration else ("motion_error",)
-    path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
+    path = VIBRATION_KIND.path(name, "sinusoidal", entry)
+    if has_own_vibration:
+        path = (*OSCILLATOR_KIND.section(name), *path[3:])
     a = float(tone.acceleration)
-    gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
+    gamma = OSCILLATOR_KIND.path(name, row.subject.axis)
     yield step(f"Γ, declared in {location(mission, gamma)}", f"Γ = {with_unit(float(tone.sensitivity), 's^2/m')}")
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
@@ -393,7 +397,7 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
     """
     index, model = row.subject.entry or 0, row.model or "full"
     power = next(each for each in stated_powers(mission) if each.subject == row.subject)
-    yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
+    yield from stated(mission, OTHER_KIND.path("mission", SPREAD_POWER.name, index), row.declared, row.evidence)
     yield effect_from_elsewhere()
     ratio, energy = 10 ** (power.islr / 10), mainlobe_energy(mission)
     rms = float(power.rms(model, energy))

@@ -34,7 +34,8 @@ from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
 from bisar_budget.effects.slow_tones import SlowTone
 from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
-from bisar_budget.faults import KeyPath, changes_words, printable
+from bisar_budget.error_kinds.random_kinds import VIBRATION_KIND
+from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
@@ -274,13 +275,12 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
     """
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
-    path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
+    path = VIBRATION_KIND.path(platform, "sinusoidal" if is_sinusoid else "wideband", entry)
     if row.declared is None:
-        yield step(missing(mission, path))
+        yield step(missing(mission, path[:5]))
     elif is_sum:
         yield from _near_lines(mission, platform, entry, row.declared)
     else:
-        path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
         yield step(f"Declared in {location(mission, path)}", as_written(mission, path))
         if is_sinusoid:
             yield from _displacement(mission, platform, entry)

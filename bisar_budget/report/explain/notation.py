@@ -12,6 +12,7 @@ from typing import NamedTuple
 from unicodedata import combining, normalize
 
 from bisar_budget.catalogue import FORMULAS, SYMBOLS, TEXTS
+from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.report.words.sentences import xml_text
 
 _FORMULA_TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?|det Q|[^\W\d_][\w\u0300-\u036f\u20d0-\u20ff]*|[-+*/^()|])")
@@ -255,7 +256,6 @@ def _closed(tokens: tuple[str, ...], end: str) -> _ParsedPart:
 
 
 AXIS_LETTERS = "xyz"
-STATE_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 EDGE_PHASE = TEXTS["edge phase"]
 CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
 VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
@@ -267,12 +267,12 @@ LOOK_AZIMUTH = TEXTS["look azimuth"]
 DETERMINANT = TEXTS["determinant"]
 
 
-def motion_symbol(state: str, axis: str, platform: str) -> str:
-    """Symbol of a motion error, such as `ã_xt`; `state` is position, velocity or acceleration."""
-    return f"{STATE_LETTERS[state]}_{axis}{platform[0]}"
+def motion_symbol(state: StateKind, axis: str, platform: str) -> str:
+    """Symbol of an error of position, velocity or acceleration, such as `ã_xt`."""
+    return f"{state.symbol}_{axis}{platform[0]}"
 
 
-def motion_coefficients(state: str, axis: str, platform: str) -> dict[int, str]:
+def motion_coefficients(state: StateKind, axis: str, platform: str) -> dict[int, str]:
     """Formulas in Table I for the coefficients of a motion error.
 
     The keys of the result are the powers of slow time.
@@ -281,7 +281,7 @@ def motion_coefficients(state: str, axis: str, platform: str) -> dict[int, str]:
     return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
 
 
-def motion_phase(state: str, axis: str, platform: str) -> str | None:
+def motion_phase(state: StateKind, axis: str, platform: str) -> str | None:
     """Formula in Table II for a motion error; None for a position error, which has no quadratic phase."""
     return TEXTS.get(f"Table II {motion_symbol(state, axis, platform)} 0")
 

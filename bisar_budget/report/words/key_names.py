@@ -4,7 +4,7 @@ The names of keys are already words, and the path of a key names the owner: `pla
 azimuth of the receiver. The words are therefore made from the path, and no table has to list every key.
 """
 
-from bisar_budget.error_kinds import STATE_KINDS
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 
 _ERROR_SECTION = "motion_error"

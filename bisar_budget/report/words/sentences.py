@@ -5,7 +5,6 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from bisar_budget.error_kinds import SumKind
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -173,7 +172,7 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
         return f"{sign}{format_quantity(level, 'dB', 3, rounding)}" if level else AS_DECLARED
     unit = _file_unit(row.line, row.unit)
     kind = row.subject.facts
-    if not unit and row.unit == "rad" and isinstance(kind, SumKind) and kind.is_phase:
+    if not unit and row.unit == "rad" and kind.is_phase:
         unit = phase_unit(mission)
     return format_in(_level(value, row.unit), row.unit, unit, 3, rounding)
 
@@ -183,9 +182,7 @@ def row_limit(row: Row, mission: MissionFindings) -> str:
 
     Image levels (rows of PSLR and ISLR) are rounded to nearest, because they are never copied into a file.
     """
-    kind = row.subject.facts
-    is_level = isinstance(kind, SumKind) and kind.is_level
-    return row_size(row.allowable, row, mission, "nearest" if is_level else "down")
+    return row_size(row.allowable, row, mission, "nearest" if row.subject.facts.is_level else "down")
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
