@@ -13,6 +13,8 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.random_effect import RandomError, SensorCases
+from bisar_budget.error_kinds.path_kinds import POSITION_KIND
+from bisar_budget.error_kinds.random_kinds import IMU_KIND
 from bisar_budget.faults import KeyPath
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, NEEDED_IMU_FIGURES, AidedGnss, AidedImu, Navigation
@@ -30,6 +32,7 @@ def navigation_warnings(case: Case) -> Iterator[tuple[KeyPath, Note]]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         error, key = platform.motion_error, ("platforms", name, "motion_error")
+        fixes = ".".join(map(str, POSITION_KIND.section(name)))  # a GNSS receiver of the catalogue states them
         if error.navigation is not None:
             yield from (
                 ((*key, "navigation"), note)
@@ -37,9 +40,7 @@ def navigation_warnings(case: Case) -> Iterator[tuple[KeyPath, Note]]:
                 if random_error.navigation is not None and random_error.owner == name
                 for note in _of_aided(mission, error.navigation, random_error)
             )
-        elif error.imu is not None and f"platforms.{name}.motion_error.position" in {
-            figure.key for figure in mission.taken
-        }:
+        elif error.imu is not None and any(figure.key == fixes for figure in mission.taken):
             yield (*key, "sensor"), _of_free_running(mission, name, case.random)
         yield from _contradiction(mission, name, error)
 
@@ -62,7 +63,7 @@ def _of_free_running(mission: Mission, name: str, errors: Sequence[RandomError])
     phases = [
         error.full.quadratic * (error.declared or 0.0)
         for error in errors
-        if error.owner == name and error.subject.kind == "imu"
+        if error.owner == name and error.kind is IMU_KIND
     ]
     free = math.sqrt(math.fsum(float(phase) ** 2 for phase in phases))
     aided = _phase_if_aided(mission, name)

@@ -346,7 +346,20 @@ _ERROR_KEYS = (
     *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
     *("oscillator", "synchronization"),
 )
-_NO_SIZES = ("age", "arm", "averaging", "bandwidth", "correlation_time", "frequency", "interval")
+_NO_SIZES = (
+    "after",
+    "age",
+    "arm",
+    "averaging",
+    "bandwidth",
+    "before",
+    "correlation_time",
+    "frequency",
+    "from",
+    "interval",
+    "rate",
+    "to",
+)
 ACCEPTED_ERRORS = (
     "accepted: a key of an error with one number, such as platforms.receiver.motion_error.velocity, "
     "platforms.receiver.motion_error.imu.gyro_bias, platforms.receiver.oscillator.level, timing_error.quadratic"

@@ -758,12 +758,15 @@ def names_requirements(root: Mapping[str, object]) -> bool:
     return isinstance(requirements, dict) and "file" in requirements
 
 
+_KEYS_OF_PARTS = ("sensor", "navigation")  # keys of a section that name parts of the catalogue, or contain such keys
+
+
 def names_files(root: Mapping[str, object]) -> bool:
     """Whether the content of a mission file, valid or not, names a part, an orbit, a log or a requirements file."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return names_requirements(root) or any(
-        key in FLOWN_SECTIONS or (isinstance(item, dict) and ("sensor" in item or "navigation" in item))
+        key in FLOWN_SECTIONS or (isinstance(item, dict) and not item.keys().isdisjoint(_KEYS_OF_PARTS))
         for section in sections
         if isinstance(section, dict)
         for key, item in section.items()

@@ -98,6 +98,9 @@ class AidedGnss(NamedTuple):
 AIDED_GNSS_FIGURES = ("position", "velocity")
 
 
+OUTAGE_KEYS = {"from": "start", "to": "end"}  # keys of the file to fields
+
+
 class Outage(NamedTuple):
     """Interval without fixes, relative to mid-aperture, both ends included. [s]"""
 

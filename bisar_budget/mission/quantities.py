@@ -30,6 +30,7 @@ from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_inde
 from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MISSION, Mission, Simulation
+from bisar_budget.mission.navigation import OUTAGE_KEYS
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
 from bisar_budget.mission.readers import (
     DIRECTION,
@@ -341,6 +342,7 @@ _OMITTED_SECTIONS: Mapping[str, Callable[[], object]] = {
     "simulation": Simulation,
 }
 _STATE_NAMES = tuple(kind.name for kind in STATE_KINDS)
+_FIELDS_BY_KEY = {**POWERS, **OUTAGE_KEYS}  # of keys that cannot be names of fields
 _TRIPLES = (*_STATE_NAMES, *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
 _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
@@ -369,7 +371,7 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
     if name in _CURVE_ABSCISSAS:
         return value._replace(**{name: _with_point(getattr(value, name), name, ".".join(remaining), number)})
-    name = POWERS.get(name, name)
+    name = _FIELDS_BY_KEY.get(name, name)
     below = getattr(value, name)
     if below is None and remaining:
         below = _OMITTED_SECTIONS[name]()
@@ -433,7 +435,7 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
         return _point(getattr(value, name), name, ".".join(remaining))
     if isinstance(value, MotionError) and name in _STATE_NAMES:
         return _value_below(value.stated(name), remaining)
-    return _value_below(getattr(value, POWERS.get(name, name)), remaining)
+    return _value_below(getattr(value, _FIELDS_BY_KEY.get(name, name)), remaining)
 
 
 def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:

@@ -125,8 +125,8 @@ UNIT = {
     f"{NAVIGATION}imu.angle_random_walk": "3 deg/sqrt(h)",
 }
 FIXES = {
-    f"{NAVIGATION}gnss.rate": "1 Hz",
-    f"{NAVIGATION}gnss.position": "5 cm",
+    f"{NAVIGATION}gnss.rate": "2 Hz",
+    f"{NAVIGATION}gnss.position": "2 cm",
     f"{NAVIGATION}gnss.velocity": "10 cm/s",
     f"{NAVIGATION}before": "3 s",
     f"{NAVIGATION}after": "3 s",
@@ -224,11 +224,11 @@ ERROR_KEYS: dict[str, ErrorKey] = {
                 {**UNIT, f"{NAVIGATION}gnss.rate": "1 Hz"},
                 "mosaic-x5-rtk",
             ),
-            ("gnss.rate", "1 Hz", "0.5 Hz", AIDED, "10 Hz"),
-            ("gnss.position", "5 cm", "20 cm", AIDED, "5 mm"),
-            ("method", "filtered", "filtered", {**UNIT, **FIXES, f"{NAVIGATION}after": "0 s"}, "smoothed"),
-            ("before", "0 s", "0 s", AIDED, "10 s"),
-            ("after", "0 s", "0 s", AIDED, "10 s"),
+            ("gnss.rate", "2 Hz", "1 Hz", AIDED, "10 Hz"),
+            ("gnss.position", "2 cm", "4 cm", AIDED, "5 mm"),
+            ("method", "filtered", "smoothed", {**UNIT, **FIXES, f"{NAVIGATION}after": "0 s"}, "smoothed"),
+            ("before", "1 s", "0 s", AIDED, "10 s"),
+            ("after", "1 s", "0 s", AIDED, "10 s"),
         )
     },
     **{
@@ -238,11 +238,11 @@ ERROR_KEYS: dict[str, ErrorKey] = {
             ("gnss.velocity", "1 cm/s", "0.5 cm/s", AIDED),
             ("gnss.correlation_time", "10 s", "30 s", AIDED),
             ("heading", "40 deg", "80 deg", AIDED),
-            ("level", "6 dB", "12 dB", AIDED),
+            ("level", "3 dB", "6 dB", AIDED),
         )
     },
-    f"{NAVIGATION}outages.from": ErrorKey("-1.2 s", "-1.4 s", "receiver.navigation", OUTAGE, instead="1.1 s"),
-    f"{NAVIGATION}outages.to": ErrorKey("1.2 s", "1.4 s", "receiver.navigation", OUTAGE, instead="-1.1 s"),
+    f"{NAVIGATION}outages.from": ErrorKey("-1.2 s", "-1.6 s", "receiver.navigation", OUTAGE, instead="1.1 s"),
+    f"{NAVIGATION}outages.to": ErrorKey("1.2 s", "1.6 s", "receiver.navigation", OUTAGE, instead="-1.1 s"),
     f"{ERROR}time_tag": ErrorKey("1 ms", "2 ms", "receiver.time_tag"),
     f"{ERROR}lever_arm.arm": ErrorKey(["10 m", 0, "5 m"], ["20 m", 0, "5 m"], "receiver.lever_arm.attitude", LIGHT),
     f"{ERROR}lever_arm.uncertainty": ErrorKey("1 m", "2 m", "receiver.lever_arm.uncertainty"),
