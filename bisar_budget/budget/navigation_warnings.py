@@ -14,7 +14,7 @@ from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.error_kinds.path_kinds import POSITION_KIND
-from bisar_budget.error_kinds.random_kinds import IMU_KIND
+from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
 from bisar_budget.faults import KeyPath
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, NEEDED_IMU_FIGURES, AidedGnss, AidedImu, Navigation
@@ -63,7 +63,7 @@ def _of_free_running(mission: Mission, name: str, errors: Sequence[RandomError])
     phases = [
         error.full.quadratic * (error.declared or 0.0)
         for error in errors
-        if error.owner == name and error.kind is IMU_KIND
+        if error.owner == name and error.kind.sizes is INERTIAL_FIGURES
     ]
     free = math.sqrt(math.fsum(float(phase) ** 2 for phase in phases))
     aided = _phase_if_aided(mission, name)
