@@ -21,6 +21,7 @@ from bisar_budget.geometry import PlatformState, norm
 from bisar_budget.image_plane import LEGENDRE_LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, Navigation, Outage
+from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.navigation.error_state import (
     ACCELEROMETER_BIAS,
     GYRO_BIAS,
@@ -34,9 +35,11 @@ from bisar_budget.navigation.error_state import (
 from bisar_budget.navigation.smoother import AidedCovariance, FlightSteps, StartSigmas, aided_covariance
 from bisar_budget.navigation.timeline import FixSchedule, Timeline, timeline_of
 from bisar_budget.paths.earth import free_fall
+from bisar_budget.paths.flight_history import FlightHistory
 
 _TURNING_STEP_S = 0.1  # within which attitude and specific force may be taken as constant
 _STRAIGHT_STEP_S = 1.0
+_OUTER_TURNING_STEP_S = 0.25  # of a log, beyond the aperture
 _SHORTEST_STEP_S = 1e-12
 WHITE_SIGMA_RATIO = 3.0  # of the sigma of fixes with a correlation time to the sigma of their white part
 MOST_ORDER_COUNT = 24  # Legendre orders of the position error; higher ones only spread power
@@ -238,11 +241,12 @@ def _covariance(
             ),
             half[case],
             turns=bool(turns[case]),
+            turns_outside=history_of(mission, name) is not None,
         )
         for case in range(half.size)
     ])  # fmt: skip
     arm = inputs["arm"]
-    flight = flight_of(mission, state, half, timeline, arm if np.any(arm) else None)
+    flight = flight_of(mission, name, state, half, timeline, arm if np.any(arm) else None)
     figures = {figure: inputs[figure].T for figure in AIDED_IMU_FIGURES}
     scale = np.zeros_like(figures["accelerometer_bias"])
     scale[:, 2] = figures["accelerometer_scale_factor"][:, 2] * STANDARD_GRAVITY_MPS2
@@ -267,10 +271,19 @@ def _covariance(
     )
 
 
-def fix_schedule(navigation: Navigation, half: float, *, turns: bool = True) -> FixSchedule:
+def history_of(mission: Mission, name: str) -> FlightHistory | None:
+    """Velocity of a platform beyond the aperture; None if its path comes from no log."""
+    path: FlownPath | None = getattr(mission.platforms, name).path
+    return None if path is None else path.history
+
+
+def fix_schedule(
+    navigation: Navigation, half: float, *, turns: bool = True, turns_outside: bool = False
+) -> FixSchedule:
     """Schedule of the fixes of an aided navigation, in plain numbers.
 
-    `half` is half the aperture time. [s] `turns` tells whether the path turns within the aperture.
+    `half` is half the aperture time. [s] `turns` and `turns_outside` tell whether the path turns within and outside
+    the aperture.
     """
     return FixSchedule(
         half_s=half,
@@ -279,6 +292,7 @@ def fix_schedule(navigation: Navigation, half: float, *, turns: bool = True) -> 
         rate_hz=navigation.gnss.rate,
         outages=navigation.outages,
         turning_step_s=_TURNING_STEP_S if turns else _STRAIGHT_STEP_S,
+        outer_step_s=_OUTER_TURNING_STEP_S if turns_outside else _STRAIGHT_STEP_S,
         is_smoothed=navigation.is_smoothed,
     )
 
@@ -290,18 +304,20 @@ def _turns(state: PlatformState) -> Booleans:
 
 
 def flight_of(
-    mission: Mission, state: PlatformState, half: Floats, timeline: Timeline, arm: Floats | None
+    mission: Mission, name: str, state: PlatformState, half: Floats, timeline: Timeline, arm: Floats | None
 ) -> FlightSteps:
     """Attitude and specific force of a platform between the moments of a timeline.
 
-    Beyond the aperture the platform flies straight on with the velocity at the end of the aperture; a platform in
-    free fall goes on falling. Gravity is that of mid-aperture, and points down in the axes of the scene: a navigation
-    turns its level axes along with the Earth's curvature.
+    Beyond the aperture the platform flies as its log says. Without a log it flies straight on with the velocity at
+    the end of the aperture; a platform in free fall goes on falling. Gravity is that of mid-aperture, and points down
+    in the axes of the scene: a navigation turns its level axes along with the Earth's curvature.
 
     Parameters
     ----------
     mission : Mission
         Mission, whose scene has the axes of the result.
+    name : str
+        Name of the platform.
     state : PlatformState
         Path of the platform in each case.
     half : (cases,)
@@ -311,10 +327,12 @@ def flight_of(
     arm : (3, cases), optional
         Lever arm along the axes of the body. [m]
     """
+    history = history_of(mission, name)
     falling = 0.0 if state.fall is None else state.fall.share
     moments, middles = timeline.times, timeline.middles
-    _, velocity = _extended(mission, state, half, moments, falling)
-    _, middle_velocity = _extended(mission, state, half, middles, falling)
+    velocity, middle_velocity = (
+        _velocities(mission, state, half, times, falling, history) for times in (moments, middles)
+    )
     steps = np.maximum(timeline.steps, _SHORTEST_STEP_S)  # steps of no duration only pad the columns
     acceleration = np.diff(velocity, axis=1) / steps
     acceleration[2] += norm(free_fall(state.position, state.velocity, mission.scene.axes))
@@ -326,16 +344,21 @@ def flight_of(
     return FlightSteps(body=np.transpose(axes, (2, 3, 1, 0)), force=np.transpose(force, (1, 2, 0)), arm=of_arm)
 
 
-def _extended(
-    mission: Mission, state: PlatformState, half: Floats, times: Floats, falling: PerCase
-) -> tuple[Floats, Floats]:
-    """Positions [m] and velocities [m/s] of a platform within and beyond the aperture, (3, *times.shape).
+def _velocities(
+    mission: Mission,
+    state: PlatformState,
+    half: Floats,
+    times: Floats,
+    falling: PerCase,
+    history: FlightHistory | None,
+) -> Floats:
+    """Velocities of a platform at slow times within and beyond the aperture, (3, *times.shape). [m/s]
 
-    `falling` is 1 for a platform in free fall, and 0 for any other.
+    `falling` is 1 for a platform in free fall, and 0 for any other. `history` is the velocity by a log.
     """
     inside = np.clip(times, -half, half)
     position, velocity = (np.array(np.broadcast_arrays(*vector, inside)[:3]) for vector in state.at(inside))
-    beyond = times - inside
-    fallen = free_fall(tuple(position), tuple(velocity), mission.scene.axes)
-    fall = np.array(np.broadcast_arrays(*fallen)) * falling
-    return position + velocity * beyond + fall * beyond**2 / 2, velocity + fall * beyond
+    if history is not None:
+        return np.where(times == inside, velocity, history.at(times))
+    fallen = np.array(np.broadcast_arrays(*free_fall(tuple(position), tuple(velocity), mission.scene.axes)))
+    return np.asarray(velocity + fallen * falling * (times - inside))

@@ -60,6 +60,7 @@ from bisar_budget.paths.flight import (
     track_around,
     widest_stretch,
 )
+from bisar_budget.paths.flight_history import history_of
 from bisar_budget.paths.free_fall import fall_of, of_scene
 from bisar_budget.paths.instant import DAY_S, Instant, later
 from bisar_budget.paths.log_places import LogKeys, filled_sigmas, hold_to_motion
@@ -205,7 +206,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     if platform.orbit is not None:
         path = _of_orbit(mission, platform.orbit, _required_axes(axes, "orbit"), read)
     elif platform.trajectory is not None:
-        path = _of_log(mission, platform.trajectory, axes, read)
+        path = _of_log(mission, platform.trajectory, axes, read, _flight_of(mission, platform))
     elif platform.latitude is not None:
         path = _of_position(platform, _required_axes(axes, "latitude"), mission.collection.aperture_time)
     else:
@@ -223,6 +224,12 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     for accuracy_stated in path.stated:
         error = _filled(error, accuracy_stated, path.state)
     return platform._replace(path=path, motion_error=error)
+
+
+def _flight_of(mission: Mission, platform: Platform) -> tuple[float, float] | None:
+    """First and last slow time of the flight that an aided navigation of a platform uses; None without one. [s]"""
+    navigation, half = platform.motion_error.navigation, mission.collection.aperture_time / 2
+    return None if navigation is None else (-half - navigation.before, half + float(navigation.after_s))
 
 
 def _file_problem(file: str | None, error: PathFileError) -> Problem:
@@ -440,23 +447,40 @@ def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], 
         )
 
 
-def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
-    """Path of a platform over the aperture from the flight log that the mission names, or from the cache."""
+def _of_log(
+    mission: Mission,
+    route: TrajectorySource,
+    axes: earth.SceneAxes | None,
+    read: Beside,
+    flight: tuple[float, float] | None,
+) -> FlownPath:
+    """Path of a platform over the aperture from the flight log that the mission names, or from the cache.
+
+    `flight` are the first and the last slow time of the flight that an aided navigation uses [s]; None without one.
+    """
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
-        key = (route, digest, mission.collection.center_time, axes, aperture_time)
-        return _kept(_paths, _KEPT_PATH_COUNT, key, lambda: _log_path(mission, route, axes, data, digest))
+        key = (route, digest, mission.collection.center_time, axes, aperture_time, flight)
+        return _kept(_paths, _KEPT_PATH_COUNT, key, lambda: _log_path(mission, route, axes, data, digest, flight))
     except PathFileError as error:
         problem = _file_problem(None if error.key else route.file, error)
         raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
 
 
 def _log_path(
-    mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
+    mission: Mission,
+    route: TrajectorySource,
+    axes: earth.SceneAxes | None,
+    data: bytes,
+    digest: str,
+    flight: tuple[float, float] | None,
 ) -> FlownPath:
-    """Path over an aperture, smoothed from a flight log, with the log's noise, stated accuracy and warnings."""
+    """Path over an aperture, smoothed from a flight log, with the log's noise, stated accuracy and warnings.
+
+    `flight` is described in `_of_log`.
+    """
     center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
@@ -489,6 +513,7 @@ def _log_path(
         log_noise=LogNoise(fitted.residual, fitted.correlation_time, log.grid, route.processed),
         acceleration_noise=fitted.acceleration_noise,
         path_noise=fitted.path_noise,
+        history=None if flight is None else history_of(times, log.places, *flight),
     )
 
 

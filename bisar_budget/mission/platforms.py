@@ -77,6 +77,7 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy
+from bisar_budget.paths.flight_history import FlightHistory
 from bisar_budget.paths.instant import SCALES, Instant, parse_instant
 
 if TYPE_CHECKING:
@@ -530,6 +531,8 @@ class FlownPath(NamedTuple):
         Covariance of the error of the fitted acceleration. [m²/s⁴]
     path_noise : PathNoise, optional
         Noise that remains in a smoothed path.
+    history : FlightHistory, optional
+        Velocity before and after the aperture, if the path comes from a log and the platform has an aided navigation.
     """
 
     state: PlatformState
@@ -554,6 +557,7 @@ class FlownPath(NamedTuple):
     log_noise: LogNoise | None = None
     acceleration_noise: Matrix | None = None
     path_noise: PathNoise | None = None
+    history: FlightHistory | None = None
 
     @property
     def is_raw(self) -> bool:

@@ -66,6 +66,7 @@ def _bare(mission: Mission) -> Mission:
                 is_doubted=path.is_doubted,
                 stated=tuple(statement._replace(words="") for statement in path.stated),
                 log_noise=path.log_noise,
+                history=path.history,
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)

@@ -5,6 +5,7 @@ __all__ = [
     "accuracy",
     "earth",
     "flight",
+    "flight_history",
     "free_fall",
     "instant",
     "log_places",

@@ -72,6 +72,7 @@ class _Flights:
         timeline = Timeline(moments[:, None], is_fix[:, None], np.zeros((moments.size, 1)), np.zeros(1, int))
         flight = flight_of(
             mission,
+            name,
             getattr(mission.platforms, name).state,
             np.array([half]),
             timeline,
