@@ -11,7 +11,7 @@ _ERROR_SECTION = "motion_error"
 _IMPLIED_SECTIONS = frozenset({"platforms", "collection", "radar", _ERROR_SECTION})
 _VECTOR_KEYS = frozenset({"position", "velocity", "acceleration", "jerk", "snap"})  # of a path, along x, y, z
 _AXIS_NAMES = dict(zip("012", "xyz", strict=True))
-_WORDS = {**REQUIREMENT_NAMES, "requirements": "required", "imu": "IMU"}
+_WORDS = {**REQUIREMENT_NAMES, "requirements": "required", "imu": "IMU", "gnss": "GNSS"}
 _STATES = frozenset(kind.name for kind in STATE_KINDS)
 
 
