@@ -191,6 +191,10 @@ class Fall(Protocol):
     def rotation(self) -> Vectors:
         """Angular rate vector of the scene axes with respect to inertial space. [rad/s]"""
 
+    @property
+    def share(self) -> PerCase:
+        """1 in cases with a platform in free fall, and 0 in all other cases."""
+
     def of(self, cases: Any) -> "Fall":
         """Select the dynamics of some cases, by their indices."""
 

@@ -21,6 +21,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import EQUAL_USE_FRACTION
 from bisar_budget.design.table import (
+    DOUBTS,
     GEOMETRY,
     REASON,
     VERDICT,
@@ -85,8 +86,8 @@ class State(NamedTuple):
 
     `row` has the highest utilization of the rows that decide; `requirement` sets its allowable. Both are None if no
     row is judged. `reason` explains why the mission is invalid at this value; it is empty if the mission is valid.
-    `waived_by` are the ids of the waivers of a waived state, which does not comply. Resolutions are from peak to
-    first null on the ground. [m]
+    `waived_by` are the ids of the waivers of a waived state, which does not comply. `doubts` are the codes of the
+    warnings that doubt the mission. Resolutions are from peak to first null on the ground. [m]
     """
 
     value: float
@@ -99,6 +100,7 @@ class State(NamedTuple):
     cross_range_resolution_m: float | None = None
     reason: str = ""
     waived_by: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 class Crossing(NamedTuple):
@@ -363,10 +365,10 @@ class _Search:
         """Check the mission at values of the number, in SI, and return the state at each value."""
         (number,) = self.table.numbers
         columns_by_name = self.table.watched({number.key: np.array(values)}, progress)
-        columns = (*VERDICT, *GEOMETRY[:2], WAIVED_BY, REASON)
+        columns = (*VERDICT, *GEOMETRY[:2], DOUBTS, WAIVED_BY, REASON)
         states = []
         for value, *line in zip(values, *(columns_by_name[column.name].tolist() for column in columns), strict=True):
-            status, row, use, requirement, range_m, cross_range_m, waived_by, reason = line
+            status, row, use, requirement, range_m, cross_range_m, doubts, waived_by, reason = line
             if reason:
                 states.append(State(value, complies=False, status=status, reason=reason))
                 continue
@@ -382,6 +384,7 @@ class _Search:
                     range_m,
                     cross_range_m,
                     waived_by=listed(waived_by),
+                    doubts=listed(doubts),
                 )
             )
         return states

@@ -16,6 +16,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import IN_UNIT
 from bisar_budget.design.cases import Cases, Values, words_of
 from bisar_budget.design.table import (
+    DOUBTS,
     GEOMETRY,
     REASON,
     VERDICT,
@@ -175,7 +176,7 @@ class Asked:
             mission_sha256=sha256(self.mission.data).hexdigest(),
             varied=tuple(column.name for column in varied),
             count=self.cases.count,
-            columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, WAIVED_BY, REASON),
+            columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, DOUBTS, WAIVED_BY, REASON),
             parts=parts,
         )
 

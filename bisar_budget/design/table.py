@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.arrays import Booleans, Indices
@@ -90,10 +90,11 @@ VERDICT = (
     Column("utilization", "", "Its declared value over its allowable."),
     Column("binding_requirement", "", "The requirement that sets its allowable.", is_text=True),
 )
+DOUBTS = Column("doubts", "", "Doubts about the mission, by the codes of the warnings of check.", is_text=True)
 WAIVED_BY = Column("waived_by", "", "Waivers that hold, as the file writes them.", is_text=True)
 REASON = Column("reason", "", "Why there is no mission in this case.", is_text=True)
 
-BETWEEN_WAIVERS = "; "
+BETWEEN_TEXTS = "; "  # in a cell with several texts
 _IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
 
 
@@ -170,9 +171,23 @@ def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Booleans) -
     """
     ids = np.full(is_waived.shape, "", dtype=object)
     for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
-        extended = np.where(ids == "", "", BETWEEN_WAIVERS).astype(object) + waiver_id
-        ids = np.where(is_waived & covers, ids + extended, ids)
+        ids = _with_text(ids, waiver_id, is_waived & covers)
     return ids
+
+
+def _doubts(judged: JudgedMission) -> Values:
+    """Return, for each case, a string with the codes of the doubts about the mission, (cases,)."""
+    codes = np.full(judged.status.shape, "", dtype=object)
+    for code, is_doubted in judged.doubts.items():
+        if is_doubted.any():
+            codes = _with_text(codes, code, is_doubted)
+    return codes
+
+
+def _with_text(texts: NDArray[np.object_], text: str, is_added: Booleans) -> NDArray[np.object_]:
+    """Append a text to the strings (cases,) of the cases in which `is_added` is true."""
+    extended = np.where(texts == "", "", BETWEEN_TEXTS).astype(object) + text
+    return np.where(is_added, texts + extended, texts)
 
 
 class Standing(NamedTuple):
@@ -186,9 +201,9 @@ class Standing(NamedTuple):
     waived_by: tuple[str, ...] = ()
 
 
-def listed(waived_by: str) -> tuple[str, ...]:
-    """Split a cell of the column `waived_by` into the ids of the waivers."""
-    return tuple(filter(None, waived_by.split(BETWEEN_WAIVERS)))
+def listed(cell: str) -> tuple[str, ...]:
+    """Split a cell of the columns `waived_by` or `doubts` into its ids or codes."""
+    return tuple(filter(None, cell.split(BETWEEN_TEXTS)))
 
 
 def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
@@ -361,7 +376,7 @@ class Table:
         """Make the columns of `cases` cases: columns of the given values, and empty columns for the results."""
         columns: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         columns |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
-        is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, WAIVED_BY, REASON)}
+        is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, DOUBTS, WAIVED_BY, REASON)}
         for name, is_of_texts in (is_text | {name: is_status(name) for name in self.fields}).items():
             columns[name] = np.full(cases, "", dtype=object) if is_of_texts else np.full(cases, math.nan)
         return columns
@@ -476,6 +491,7 @@ class Table:
             judged = judged_mission(analysis, self.question.today)
             rows = {row.subject.id: row for row in judged.rows}
             columns = _verdict(judged, rows, self.question.row, self.question.breaks)
+            columns[DOUBTS.name] = _doubts(judged)
             with np.errstate(all="ignore"):
                 geometry = (
                     *analysis.resolution[:2],

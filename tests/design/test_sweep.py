@@ -85,6 +85,8 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None, near=NEAR) 
         assert got["utilization"] == pytest.approx(use, rel=tolerance, nan_ok=True), values
         assert got["binding_requirement"] == (stands.requirement or "")
         assert got["waived_by"] == "; ".join(stands.waived_by)
+        codes = [warning.message.code for warning in found.warnings if warning.is_doubt]
+        assert {*got["doubts"].split("; ")} - {""} == {*codes}, values
         assert got["range_resolution"] == pytest.approx(found.resolution.range, rel=NEAR)
         assert got["cross_range_resolution"] == pytest.approx(found.resolution.cross_range, rel=NEAR)
         assert got["bistatic_angle"] == pytest.approx(found.geometry.bistatic_angle, rel=NEAR)

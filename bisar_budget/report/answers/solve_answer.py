@@ -184,7 +184,12 @@ def _crossing(crossing: Crossing) -> dict[str, object]:
 
 
 def _state(state: State) -> dict[str, object]:
-    return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
+    return {
+        **state._asdict(),
+        "reason": state.reason or None,
+        "waived_by": list(state.waived_by),
+        "doubts": list(state.doubts),
+    }
 
 
 # ---------------------------------------------------------------- for people
@@ -352,6 +357,8 @@ def _state_words(state: State) -> str:
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
         return f"{word}, {printable(state.reason)}"
+    if state.row is None and state.doubts and state.requirement is None:
+        return f"{word}, {', '.join(state.doubts)}"
     if state.row is None:
         return f"{word}, {_undecided(state.requirement)}"
     use = "" if state.utilization is None else f" uses {percent(state.utilization)}"
