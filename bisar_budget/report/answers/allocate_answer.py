@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from bisar_budget import __version__
-from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
+from bisar_budget.findings.offer import Offer, OfferedFigure
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS

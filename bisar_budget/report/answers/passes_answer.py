@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
 from bisar_budget import __version__
-from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.satellite_passes import Passes, SatellitePass
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style

@@ -4,8 +4,8 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.design.sensitivity import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.faults import printable
+from bisar_budget.findings.slopes import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.design.compare import Comparison, PartState
-from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.solution import Comparison, Crossing, Imaged, PartState, Solution, State
 from bisar_budget.findings.status import STATUS
 from bisar_budget.json_types import JsonDocument
 from bisar_budget.report import Style

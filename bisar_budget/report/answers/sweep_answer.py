@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.design.cases import Values
-from bisar_budget.design.table import Column, Part
 from bisar_budget.faults import SetValue, printable
+from bisar_budget.findings.case_table import Column, Part, Values
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
