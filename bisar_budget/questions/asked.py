@@ -24,6 +24,8 @@ from bisar_budget.mission.quantities import Choices, Number, QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.questions.cases import words_of
 from bisar_budget.questions.table import DOUBTS, GEOMETRY, REASON, VERDICT, WAIVED_BY, Question, Table, is_status
+from bisar_budget.report.words.key_names import in_words
+from bisar_budget.report.words.sentences import sentence
 from bisar_budget.workers import MapBlocks, in_processes
 
 _SLOW_FRACTION = 1 / 8  # if a larger fraction of cases is read one by one, processes share the cases
@@ -157,7 +159,10 @@ class Asked:
         """
         varied = [
             Column(
-                each.key, each.dimension.si if isinstance(each, Number) else "", "Varies.", isinstance(each, Choices)
+                each.key,
+                each.dimension.si if isinstance(each, Number) else "",
+                f"{sentence(in_words(each.key))}, which varies.",
+                isinstance(each, Choices),
             )
             for each in self.cases.varied
         ]
