@@ -534,7 +534,7 @@ def _explain(
     from bisar_budget.questions.checks import check as ask
     from bisar_budget.questions.outside import DAY_OF_RUN
     from bisar_budget.report.explain.explanation import explain, explain_requirement
-    from bisar_budget.report.words.heading import overrides_lines
+    from bisar_budget.report.words.heading import other_overrides, wrapped_overrides
     from bisar_budget.report.words.requirements import requirement_id
 
     texts: list[str] = []
@@ -559,7 +559,7 @@ def _explain(
         else:
             continue
         shown_overrides = tuple(override for override in findings.overrides if override.origin != DAY_OF_RUN)
-        override_lines = overrides_lines(findings._replace(overrides=shown_overrides))
+        override_lines = wrapped_overrides(other_overrides(findings._replace(overrides=shown_overrides)))
         texts.append(text + "".join(f"{line}\n" for line in override_lines))
     if not texts:
         problem = closed(unknown_id(row_id, ids, files[0], "row or requirement"))

@@ -15,9 +15,9 @@ from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
 from bisar_budget.report.drawing.sky_plot import sky_plot
-from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.sentences import (

@@ -1,13 +1,10 @@
-"""Write the report as JSON `bisar-budget/check/1`. Later versions may add keys, but never change or remove them."""
+"""The content of JSON `bisar-budget/check/1`. Later versions may add keys, but never change or remove them."""
 
-import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from functools import cache
 from typing import TYPE_CHECKING
 
-from bisar_budget import __version__
 from bisar_budget.faults import Fault
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
@@ -20,6 +17,7 @@ from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Shares
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.report import Piece, Style
+from bisar_budget.report.renderers.json import indented
 
 if TYPE_CHECKING:
     from bisar_budget.report.words.heading import AboutMission
@@ -30,13 +28,13 @@ CHECK_FORMAT = "bisar-budget/check/1"
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
     """Write the JSON item of one mission, with each row on its own line. A non-finite number raises an error."""
     item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
-    return _indented(item, _INDENTED_LEVELS, _MARGIN)
+    return indented(item, _INDENTED_LEVELS, _MARGIN)
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     """Write one JSON document with the items of all missions."""
     document = {"format": CHECK_FORMAT, "version": version, "status": worst(piece.status for piece in pieces)}
-    head = _indented(document, 1).removesuffix("\n}")
+    head = indented(document, 1).removesuffix("\n}")
     missions = f",\n{_MARGIN}".join(piece.text for piece in pieces)
     return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'
 
@@ -45,42 +43,6 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 _RENAMED = {"subject": "id", "remarks": "notes", "requirement_ids": "requirement_id"}
 _ROW_KEYS = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
 _INDENTED_LEVELS, _MARGIN = 2, "    "  # of a mission and of its rows; the content of a row stays on its line
-
-
-@cache
-def _encoder(separator: str) -> Callable[[object], str]:
-    return json.JSONEncoder(allow_nan=False, separators=(separator, ": ")).encode
-
-
-def _indented(value: object, levels: int, margin: str = "") -> str:
-    """Write a value as JSON in which only the outermost `levels` levels of nesting are indented.
-
-    With an indentation, `json.dumps` would run in pure Python and take as long as the check itself.
-    """
-    if levels == 0 or not value or not isinstance(value, dict | list | tuple):
-        return _encoder(", ")(value)
-    inner = margin + "  "
-    between = f",\n{inner}"
-    if isinstance(value, dict):
-        opening, closing = "{", "}"
-        if any(isinstance(item, dict | list | tuple) for item in value.values()):
-            items = [f'"{key}": {_indented(item, levels - 1, inner)}' for key, item in value.items()]
-            content = between.join(items)
-        else:
-            content = _encoder(between)(value)[1:-1]
-    else:
-        opening, closing = "[", "]"
-        if levels == 1:
-            # A quote within a string follows a backslash, so the text is cut between rows only.
-            content = _encoder(", ")(value)[1:-1].replace('}, {"id": ', f'}}{between}{{"id": ')
-        else:
-            content = between.join([_indented(item, levels - 1, inner) for item in value])
-    return f"{opening}\n{inner}{content}\n{margin}{closing}"
-
-
-def document_text(form: str, content: Mapping[str, object]) -> str:
-    """Write a JSON document in the documented format `form`. A non-finite number raises an error."""
-    return json.dumps({"format": form, "version": __version__, **content}, indent=2, allow_nan=False) + "\n"
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
