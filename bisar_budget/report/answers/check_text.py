@@ -181,6 +181,8 @@ def _rows(mission: MissionFindings, style: Style, room: int) -> doc.Block:
         return doc.Close([_row_table(shown, [cells[row.id] for row in shown], style), key])
 
     max_hidden = min(len(passing), max(len(rows) - _MIN_LISTED_ROWS, 0)) if is_short and not mission.is_empty else 0
+    if _line_count([without(0)], style) <= room:  # usual, and a search would write the table several times
+        return without(0)
     counts = range(max_hidden)
     return without(bisect_left(counts, True, key=lambda count: _line_count([without(count)], style) <= room))
 
