@@ -90,6 +90,17 @@ class Asked:
             ):  # the file may state the path of a platform in another way
                 self._hold_to_a_mission(number)
 
+    def again(self, *, cases: Cases | None = None, columns: Sequence[str] | None = None) -> "Asked":
+        """Ask the same with other cases, or with other columns."""
+        question = self.question
+        return Asked(
+            self.mission,
+            self.cases if cases is None else cases,
+            columns=question.columns if columns is None else columns,
+            model=question.model,
+            today=question.today,
+        )
+
     def _chosen(self) -> Iterator[Mission]:
         """Yield the mission with each string value of each varied key, changing one key at a time.
 

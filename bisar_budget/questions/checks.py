@@ -30,6 +30,7 @@ from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
     from bisar_budget.findings.case_table import Cases
+    from bisar_budget.questions.asked import Asked
     from bisar_budget.questions.results import CheckResult
     from bisar_budget.report.drawing.trades import Gathered
 
@@ -203,6 +204,7 @@ def with_studies(
         The values do not fit a mission; the message begins with the name of its file.
     """
     from bisar_budget.findings.trade import TradeStudy
+    from bisar_budget.questions.asked import Asked
     from bisar_budget.questions.table import listed
     from bisar_budget.report.drawing.trades import uses_of_rows
 
@@ -218,7 +220,7 @@ def with_studies(
             progress(done, total)
 
         for mission, cases in zip(usable, all_cases, strict=True):
-            check_again = partial(gathered, mission, cases, model, today)
+            check_again = partial(gathered, _of(mission, Asked, mission, cases, model=model, today=today))
             trade = _of(mission, check_again, (), advance).trade()
             rows = _of(mission, uses_of_rows, trade, check_again)
             counts = Counter(trade.values["status"].ravel().tolist())
@@ -277,10 +279,7 @@ def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, object]) -
 
 
 def gathered(
-    mission: Mission,
-    cases: "Cases",
-    model: str | None,
-    today: dt.date,
+    asked: "Asked",
     columns: Sequence[str],
     advance: Callable[[int], None] = lambda _: None,
     jobs: int | None = None,
@@ -290,14 +289,12 @@ def gathered(
     `columns` are further columns to gather. `advance` is called after each part of the cases is checked, with the
     number of cases in this part.
     """
-    from bisar_budget.questions.asked import Asked
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import Described
 
-    swept = Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs or cores())
-    drawing_data = Gathered(
-        Described(swept, cases, mission, __version__), ("binding_requirement", "waived_by", *columns)
-    )
+    swept = asked.again(columns=columns).checked(jobs or cores())
+    described = Described(swept, asked.cases, asked.mission, __version__)
+    drawing_data = Gathered(described, ("binding_requirement", "waived_by", *columns))
     for part in swept.parts:
         drawing_data.add(part)
         advance(part.stop - part.start)

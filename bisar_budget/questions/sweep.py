@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
-from datetime import date
 from functools import cached_property, partial
 from time import perf_counter
 from typing import TYPE_CHECKING, ClassVar
@@ -86,7 +85,8 @@ def sweep(
     today, influences = influences_of(mission, model, date, outside)
     cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
     further_columns = (columns,) if isinstance(columns, str) else tuple(columns)
-    return SweepResult(mission, cases, further_columns, model, today, jobs or cores(), influences)
+    asked = Asked(mission, cases, columns=further_columns, model=model, today=today)
+    return SweepResult(asked, jobs or cores(), influences)
 
 
 @dataclass(repr=False, eq=False)
@@ -95,18 +95,14 @@ class SweepResult(AnswerResult):
 
     Each case is `mission` with one set of the values in `cases`, and is a line of the table. Cases are checked when
     their results are first needed. `to_dataframe` and `to_xarray` return the whole table, and `result[name]` returns
-    the column with this name. `more` contains the names of further columns. `statuses` counts the checked cases by
-    status, and `waived_by` has the ids of their waivers. If `workers` of a scheduler are given, they check the cases.
-    If `beside` is the path of a file, checked parts of the table are stored in a folder next to this file; if
-    `is_resumed`, a sweep that was interrupted continues with the stored parts.
+    the column with this name. `statuses` counts the checked cases by status, and `waived_by` has the ids of their
+    waivers. If `workers` of a scheduler are given, they check the cases. If `beside` is the path of a file, checked
+    parts of the table are stored in a folder next to this file; if `is_resumed`, an interrupted sweep continues with
+    the stored parts.
     """
 
     COMMAND: ClassVar[str] = "sweep"
-    mission: Mission
-    cases: Cases
-    more: tuple[str, ...]
-    model: str | None
-    day: date
+    asked: Asked
     jobs: int
     overrides: tuple[Override, ...] = ()
     workers: "Workers | None" = None
@@ -115,9 +111,15 @@ class SweepResult(AnswerResult):
     statuses: Counter[str] = field(default_factory=Counter)
     waived_by: dict[str, None] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        """Prepare the checks; raises `QuestionError` for an unknown column, or a key without a valid value."""
-        self.asked = Asked(self.mission, self.cases, columns=self.more, model=self.model, today=self.day)
+    @property
+    def mission(self) -> Mission:
+        """The mission that is checked with the values of each case."""
+        return self.asked.mission
+
+    @property
+    def cases(self) -> Cases:
+        """The cases of the sweep."""
+        return self.asked.cases
 
     def __repr__(self) -> str:
         """Text on one line with the varied keys, the number of cases and the number of complying cases."""
@@ -133,9 +135,7 @@ class SweepResult(AnswerResult):
             return 0.0
 
         def trial(count: int) -> float:
-            sample = sampled_cases(self.cases, count)
-            asked = Asked(self.mission, sample, columns=self.more, model=self.model, today=self.day)
-            blocks = asked.checked().parts
+            blocks = self.asked.again(cases=sampled_cases(self.cases, count)).checked().parts
             began = perf_counter()
             for _ in blocks:
                 pass
@@ -241,7 +241,7 @@ class SweepResult(AnswerResult):
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
         trade = trade_data.trade(is_polar=is_polar)
-        check_again = partial(gathered, self.mission, self.cases, self.model, self.day, jobs=self.jobs)
+        check_again = partial(gathered, self.asked, jobs=self.jobs)
         return trade_drawing(
             trade,
             uses_of_rows(trade, check_again),
