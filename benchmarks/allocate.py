@@ -13,11 +13,11 @@ from datetime import date
 from pathlib import Path
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.allocate import allocate
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.questions.allocate import allocate
 
 MISSIONS = Path(__file__).parent.parent / "specs" / "missions"
 DAY = date(2026, 1, 1)
@@ -42,10 +42,10 @@ def misfit(sheet: SpecificationSheet) -> float:
 
 def compare(name: str, mission: Mission, runs: int) -> None:
     """Print medians of both, in turn."""
-    tasks = (lambda: check_mission(mission, DAY), lambda: allocate(mission, reserve=0.0, today=DAY))
+    tasks = (lambda: check_mission(mission, DAY), lambda: allocate(mission, reserve=0.0, date=DAY).found)
     each = [[timed(task) for task in tasks] for _ in range(runs + 1)][1:]
     checking, asking = (1e3 * statistics.median(seconds) for seconds in zip(*each, strict=True))
-    sheet = allocate(mission, reserve=0.0, today=DAY)
+    sheet = allocate(mission, reserve=0.0, date=DAY).found
     said = "no room" if sheet.broken else f"off by {misfit(sheet):.0e}"
     print(f"  {name:38} {asking:5.0f} ms ÷ {checking:4.0f} ms = {asking / checking:5.1f}   {said}", flush=True)
 

@@ -13,11 +13,11 @@ from datetime import date
 from pathlib import Path
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.sensitivity import sensitivity
-from bisar_budget.design.solve import SOLVE_SETTINGS, solve
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.questions.sensitivity import sensitivity
+from bisar_budget.questions.solve import SOLVE_SETTINGS, solve
 
 MISSIONS = Path(__file__).parent.parent / "specs" / "missions"
 DAY = date(2026, 1, 1)
@@ -35,8 +35,8 @@ def compare(name: str, mission: Mission, runs: int) -> None:
     """Print medians of all three, in turn."""
     tasks = (
         lambda: [check_mission(mission, DAY) for _ in range(SOLVE_SETTINGS.range_samples)],
-        lambda: solve(mission, "collection.aperture_time", today=DAY),
-        lambda: sensitivity(mission, today=DAY),
+        lambda: solve(mission, "collection.aperture_time", date=DAY),
+        lambda: sensitivity(mission, date=DAY),
     )
     each = [[timed(task) for task in tasks] for _ in range(runs)]
     checks, solving, asking = (1e3 * statistics.median(seconds) for seconds in zip(*each, strict=True))

@@ -21,13 +21,13 @@ import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.design.cases import Cases
-from bisar_budget.design.sweep import Asked
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.case_table import Cases
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import number_of
 from bisar_budget.mission.tree import read_tree
+from bisar_budget.questions.asked import Asked
 
 MISSION = Path(__file__).parent.parent / "specs" / "missions" / "rigling_moses_section_v.yaml"
 DAY = date(2026, 1, 1)

@@ -17,31 +17,31 @@ if TYPE_CHECKING:
     from bisar_budget.error_kinds.registry import MotionKind as MotionKind
     from bisar_budget.error_kinds.registry import register as register
     from bisar_budget.faults import MissionError as MissionError
-    from bisar_budget.front.checks import check as check
-    from bisar_budget.front.imaging import simulate as simulate
-    from bisar_budget.front.imaging import verify as verify
-    from bisar_budget.front.missions import geomspace as geomspace
-    from bisar_budget.front.missions import linspace as linspace
-    from bisar_budget.front.missions import load as load
-    from bisar_budget.front.missions import loads as loads
-    from bisar_budget.front.questions import allocate as allocate
-    from bisar_budget.front.questions import monte_carlo as monte_carlo
-    from bisar_budget.front.questions import passes as passes
-    from bisar_budget.front.questions import sensitivity as sensitivity
-    from bisar_budget.front.questions import solve as solve
-    from bisar_budget.front.questions import sweep as sweep
-    from bisar_budget.front.results import AllocateResult as AllocateResult
-    from bisar_budget.front.results import CheckResult as CheckResult
-    from bisar_budget.front.results import MonteCarloResult as MonteCarloResult
-    from bisar_budget.front.results import PassesResult as PassesResult
-    from bisar_budget.front.results import Picture as Picture
-    from bisar_budget.front.results import SensitivityResult as SensitivityResult
-    from bisar_budget.front.results import SimulateResult as SimulateResult
-    from bisar_budget.front.results import SolveResult as SolveResult
-    from bisar_budget.front.results import VerifyResult as VerifyResult
-    from bisar_budget.front.sweeps import SweepResult as SweepResult
     from bisar_budget.mission.model import Mission as Mission
     from bisar_budget.mission.quantities import QuestionError as QuestionError
+    from bisar_budget.questions.allocate import allocate as allocate
+    from bisar_budget.questions.checks import check as check
+    from bisar_budget.questions.drawn_errors import monte_carlo as monte_carlo
+    from bisar_budget.questions.missions import geomspace as geomspace
+    from bisar_budget.questions.missions import linspace as linspace
+    from bisar_budget.questions.missions import load as load
+    from bisar_budget.questions.missions import loads as loads
+    from bisar_budget.questions.passes import passes as passes
+    from bisar_budget.questions.results import AllocateResult as AllocateResult
+    from bisar_budget.questions.results import CheckResult as CheckResult
+    from bisar_budget.questions.results import MonteCarloResult as MonteCarloResult
+    from bisar_budget.questions.results import PassesResult as PassesResult
+    from bisar_budget.questions.results import Picture as Picture
+    from bisar_budget.questions.results import SensitivityResult as SensitivityResult
+    from bisar_budget.questions.results import SimulateResult as SimulateResult
+    from bisar_budget.questions.results import SolveResult as SolveResult
+    from bisar_budget.questions.results import VerifyResult as VerifyResult
+    from bisar_budget.questions.sensitivity import sensitivity as sensitivity
+    from bisar_budget.questions.simulate import simulate as simulate
+    from bisar_budget.questions.solve import solve as solve
+    from bisar_budget.questions.sweep import SweepResult as SweepResult
+    from bisar_budget.questions.sweep import sweep as sweep
+    from bisar_budget.questions.verify import verify as verify
 
 # Public names, by the module that defines them.
 _LIVES = {
@@ -49,15 +49,20 @@ _LIVES = {
     "faults": ("MissionError",),
     "mission.model": ("Mission",),
     "mission.quantities": ("QuestionError",),
-    "front.missions": ("geomspace", "linspace", "load", "loads"),
-    "front.checks": ("check",),
-    "front.results": (
+    "questions.missions": ("geomspace", "linspace", "load", "loads"),
+    "questions.checks": ("check",),
+    "questions.sweep": ("SweepResult", "sweep"),
+    "questions.solve": ("solve",),
+    "questions.sensitivity": ("sensitivity",),
+    "questions.allocate": ("allocate",),
+    "questions.passes": ("passes",),
+    "questions.drawn_errors": ("monte_carlo",),
+    "questions.verify": ("verify",),
+    "questions.simulate": ("simulate",),
+    "questions.results": (
         *("AllocateResult", "CheckResult", "MonteCarloResult", "PassesResult", "Picture"),
         *("SensitivityResult", "SimulateResult", "SolveResult", "VerifyResult"),
     ),
-    "front.sweeps": ("SweepResult",),
-    "front.imaging": ("simulate", "verify"),
-    "front.questions": ("allocate", "monte_carlo", "passes", "sensitivity", "solve", "sweep"),
 }
 _FROM = {name: module for module, names in _LIVES.items() for name in names}
 __all__ = ["__version__", *sorted(_FROM)]

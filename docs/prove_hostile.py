@@ -41,13 +41,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.streams import harmless
-from bisar_budget.design import solve
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import MAX_BYTES
+from bisar_budget.questions import solve
 from bisar_budget.report import Style, pictures, render
 from bisar_budget.report.answers import COMMON_FORMATS, written
 from bisar_budget.report.answers.diff_answer import Compared

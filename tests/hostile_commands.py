@@ -22,10 +22,10 @@ import numpy as np
 from click.testing import CliRunner, Result
 
 from bisar_budget.cli import cli
-from bisar_budget.design.sweep import Asked
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.path_formats import read_log
+from bisar_budget.questions.asked import Asked
 from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
 from tests.fuzz_commands import MISSION, Question, break_parts, broken_log, flown, radar_file, small_mission, targets

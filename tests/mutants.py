@@ -413,7 +413,7 @@ MUTANTS = (
     ),
     Mutant(
         "SOURCE_DATE_EPOCH as a local day",
-        "bisar_budget/front/checks.py",
+        "bisar_budget/questions/outside.py",
         "fromtimestamp(int(epoch), dt.UTC)",
         "fromtimestamp(int(epoch))",
         (f"{_SEAMS}test_the_day_of_an_epoch_is_that_of_utc",),
@@ -448,7 +448,7 @@ MUTANTS = (
     ),
     Mutant(
         "seam: the clock is nobody's where an error is relaxed",
-        "bisar_budget/design/sensitivity.py",
+        "bisar_budget/questions/sensitivity.py",
         'is_owed = row.subject.owner in (owner, "clock" if owner == "receiver" else owner)',
         "is_owed = row.subject.owner == owner",
         (f"{_SEAMS}test_a_clock_is_the_receivers_where_another_error_is_relaxed",),

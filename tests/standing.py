@@ -3,9 +3,9 @@
 from collections.abc import Container
 
 from bisar_budget.budget.judged_requirements import EQUAL_USE_FRACTION
-from bisar_budget.design.table import Standing
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
+from bisar_budget.findings.solution import Standing
 from bisar_budget.findings.status import STATUS
 
 

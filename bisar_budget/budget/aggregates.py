@@ -273,7 +273,7 @@ class Aggregate(FamilyRow):
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
             over = phrases.note("no-ground-point")
-        elif limit is not None and size > limit * LIMIT_RATIO:
+        elif limit is not None and case.number(self.judged.utilization) > LIMIT_RATIO:
             over = phrases.aggregate_over(wording.what, size, limit, wording.unit, *_largest(case, model, self))
         if wording.is_quadratic:
             if over and size is not None and combine != "each":
@@ -524,22 +524,24 @@ class JudgedScene:
         allowable = None if model == "published" else total
         nothing = judging.row(row_subject, None, allowable)._replace(allowable_full=total)
         if edges is None:
-            return SceneRow(nothing, self)
-        doubt = edges.has_doubt
-        if model == "published":
-            doubt = doubt | (edges.difference > total * LIMIT_RATIO)
-        judged = judging.row(row_subject, edges.difference, allowable, doubt=doubt)._replace(
+            return SceneRow(nothing, self, np.zeros(judging.cases, dtype=bool))
+        is_over_full = np.asarray(edges.difference > total * LIMIT_RATIO) & (model == "published")
+        judged = judging.row(row_subject, edges.difference, allowable, doubt=edges.has_doubt | is_over_full)._replace(
             qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
         )
         nothing.status[:] = CODE["not_evaluated"]
-        return SceneRow(judged.where(np.isinf(edges.difference), nothing), self)
+        return SceneRow(judged.where(np.isinf(edges.difference), nothing), self, is_over_full)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneRow(FamilyRow):
-    """The row that judges the phase error at the edge of the scene relative to the centre, for an array of cases."""
+    """The row that judges the phase error at the edge of the scene relative to the centre, for an array of cases.
+
+    `is_over_full` marks the cases that the published model gates and that fail under the full model.
+    """
 
     scene: JudgedScene
+    is_over_full: Booleans
 
     def in_words(self, case: Case, model: str) -> Row:
         """Build the report row for one case, including its text; `model` names the model that judges the row."""
@@ -551,7 +553,7 @@ class SceneRow(FamilyRow):
             if not degeneracy:
                 open_drift = (phrases.note("drift-is-open-at-the-edge", row_ids=drifting),) if drifting else ()
                 notes = (*edge.notes(total), *open_drift)
-            if model == "published" and edge.difference > total * LIMIT_RATIO:
+            if self.is_over_full[case.place]:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
         return worded(
             case,

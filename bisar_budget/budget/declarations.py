@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.arrays import Booleans, PerCase, PerCaseFlag
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.error_kinds.kind import SourceKind
@@ -19,12 +20,14 @@ from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES, NAVIGATION_K
 from bisar_budget.error_kinds.registry import kind_of, registered_names
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
+from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevation_deg
 from bisar_budget.mission.quantities import value_at
 
 DECLARATIONS = subject("mission", DECLARE)  # the row of all required declarations
+_TILTING_FIGURES = [figure for figure in INERTIAL_FIGURES.values() if figure.tilts]
 
 
 class Missing(NamedTuple):
@@ -42,16 +45,19 @@ class Missing(NamedTuple):
 
 
 # ---------------------------------------------------------------------- half of a cause
-def swings_nothing(platform: Platform) -> bool:
-    """Whether a platform has a nonzero lever arm, but no attitude error that would rotate it."""
+def swings_nothing(platform: Platform) -> PerCaseFlag:
+    """Whether a platform has a nonzero lever arm, but no attitude error that would rotate it.
+
+    The result is a Boolean or an array (cases,).
+    """
     lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
-    if lever is None or lever.arm is None or not any(map(np.any, lever.arm)):
+    if lever is None or lever.arm is None:
         return False
     if platform.motion_error.navigation is not None:
         return False
-    return imu is None or all(
-        getattr(imu, figure.key) is None for figure in INERTIAL_FIGURES.values() if figure.tilts
-    )
+    if imu is not None and any(getattr(imu, figure.key) is not None for figure in _TILTING_FIGURES):
+        return False
+    return np.asarray(norm(lever.arm)) > 0
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
@@ -60,7 +66,7 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
     A lever arm has an effect only if an attitude error rotates it. If the file gives the arm, an attitude error is
     therefore required too. A stated uncertainty of the arm does not replace the attitude error.
     """
-    if not swings_nothing(getattr(mission.platforms, name)):
+    if not np.any(swings_nothing(getattr(mission.platforms, name))):
         return ""
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
 
@@ -72,17 +78,25 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
     """
     platform: Platform = getattr(mission.platforms, name)
     if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
-        vibration = platform.motion_error.vibration
-        sizes = [tone.amplitude for tone in vibration.sinusoidal]
-        sizes += [] if vibration.wideband is None else [vibration.wideband.rms]
-        is_shaken = vibration.spectrum is not None or any(np.any(size) for size in sizes)
+        is_shaken = np.any(_vibrates(platform))
         return "oscillator.acceleration_sensitivity, by which vibration acts on it" if is_shaken else ""
-    if not is_unshaken(mission, name):
+    if not np.any(is_unshaken(mission, name)):
         return ""
     return (
         "oscillator.vibration, and no sinusoidal or spectrum of motion_error.vibration, on which "
         "acceleration_sensitivity acts"
     )
+
+
+def _vibrates(platform: Platform) -> PerCaseFlag:
+    """Whether the platform states a vibration that is not zero, as a Boolean or an array (cases,)."""
+    vibration = platform.motion_error.vibration
+    if vibration.spectrum is not None:
+        return True
+    sizes = [tone.amplitude for tone in vibration.sinusoidal]
+    sizes += [] if vibration.wideband is None else [vibration.wideband.rms]
+    lengths = [norm(size) if isinstance(size, tuple) else size for size in sizes]
+    return np.asarray(np.any([*np.broadcast_arrays(False, *lengths)], axis=0))
 
 
 # ---------------------------------------------------------------------- the table of kinds
@@ -249,10 +263,15 @@ def _legs_without_delay(mission: Mission) -> list[str]:
         return ["propagation"]
     T, lacking = mission.collection.aperture_time, []
     for name, path in zip(PLATFORMS, mission.geometry.both, strict=True):
-        is_high = np.any(least_elevation_deg(path, T) >= LEAST_ELEVATION_DEG)
+        is_high = np.any(_is_high(path, T))
         if mission.propagation.leg(name) is None and is_high:
             lacking.append(f"propagation.{name}")
     return lacking
+
+
+def _is_high(path: PlatformState, aperture_time_s: PerCase) -> Booleans:
+    """Whether a zenith delay applies to the leg of a platform, as a Boolean or an array (cases,)."""
+    return np.asarray(least_elevation_deg(path, aperture_time_s) >= LEAST_ELEVATION_DEG)
 
 
 def _has_source_of_air(mission: Mission) -> bool:
@@ -376,6 +395,22 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     if still is None:
         still = still_platforms(mission)
     return list(dict.fromkeys(_missing(mission, still)))
+
+
+def groups_alike(mission: Mission, geometry: BistaticGeometry, cases: int) -> Iterator[Booleans]:
+    """Yield masks (cases,) of groups of cases that lack the same required errors.
+
+    The cases of a group agree in which platforms move and vibrate, and in which entries have no effect. There is
+    nearly always one group.
+    """
+    flags: list[PerCaseFlag] = []
+    for name, path in zip(PLATFORMS, geometry.both, strict=True):
+        platform: Platform = getattr(mission.platforms, name)
+        flags += [path.is_still, swings_nothing(platform), is_unshaken(mission, name), _vibrates(platform)]
+        flags.append(_is_high(path, mission.collection.aperture_time))
+    of_cases = np.array([np.broadcast_to(flag, (cases,)) for flag in flags])
+    for alike in np.unique(of_cases, axis=1).T:
+        yield np.asarray((of_cases == alike[:, None]).all(axis=0))
 
 
 def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:

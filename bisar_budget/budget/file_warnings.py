@@ -1,31 +1,31 @@
 """Decides which warnings about a mission file are given. The sentences of the warnings are in `phrases`.
 
 Most warnings do not change the verdict. A warning that casts doubt on the checked mission sets the status to at least
-`warn`. Each function yields a sentence and the key to which it refers. `file_warnings` finds the line of the key in
-the file.
+`warn`; `mission_doubts` decides on these. Each function yields a sentence and the key to which it refers.
+`file_warnings` finds the line of the key in the file.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
-from bisar_budget.budget.doubts import input_doubts, missing_settings
+from bisar_budget.budget.doubts import missing_settings
 from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
-from bisar_budget.budget.judged_requirements import negligible_rad, required_keys
-from bisar_budget.budget.navigation_warnings import navigation_warnings
-from bisar_budget.constants import (
-    EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2,
-    EARTH_RADIUS_M,
-    LEAST_FALLING_HEIGHT_M,
-    MAX_FLIGHT_SPEED_MPS,
+from bisar_budget.budget.judged_requirements import required_keys
+from bisar_budget.budget.mission_doubts import (
+    MISSION_DOUBTS,
+    does_not_fall,
+    flies_straight,
+    has_calm_oscillator,
+    has_doubtful_path,
+    has_idle_arm,
+    missing_phase_rad,
 )
-from bisar_budget.effects.effect import NOWHERE, PLATFORMS
-from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.budget.navigation_warnings import navigation_warnings
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.error_kinds.clock_kinds import OSCILLATOR_KIND
 from bisar_budget.error_kinds.random_kinds import LEVER_ARM_KIND
 from bisar_budget.faults import KeyPath, changes_words
@@ -38,16 +38,12 @@ from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.resolution import Resolution
 
-_MAX_GROUND_HEIGHT_M = 20e3  # of a scene, above a sphere of the Earth's mean radius
-_MIN_ORBIT_SPEED_MPS = 100.0  # over the ground, of satellites above 100 km that are not geostationary
-
 
 class _Warned(NamedTuple):
     """A warning: its sentence, and the key of the file to which it refers; None if it refers to the whole file."""
 
     key: KeyPath | None
     message: Note
-    is_doubt: bool = False
     is_of_options: bool = False
 
 
@@ -75,14 +71,19 @@ def file_warnings(
         *_noisy_fits(mission),
         *_of_instruments(case),
         *(_Warned(*warning) for warning in navigation_warnings(case)),
-        *_of_lever_arms(mission),
-        *_of_calm_oscillators(mission),
+        *_of_idle_entries(mission),
         *_of_doubted_noise(mission, rows),
         *_of_autofocus(mission, case.resolution),
         *_nothing_declared(rows),
     )
     return tuple(
-        FileWarning(None if warning.key is None else mission.line(warning.key), *warning[1:]) for warning in warnings
+        FileWarning(
+            None if warning.key is None else mission.line(warning.key),
+            warning.message,
+            is_doubt=warning.message.code in MISSION_DOUBTS,
+            is_of_options=warning.is_of_options,
+        )
+        for warning in warnings
     )
 
 
@@ -128,23 +129,13 @@ def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
 
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings about paths that may be inaccurate, unless a row already reports the doubt.
-
-    Doubts about the position and about the residual of a log are treated separately.
-    """
-    owners = {doubt.owner for doubt in input_doubts(mission) if not doubt.is_stated}
-    for name in PLATFORMS:
+    """Yield warnings about paths that may be inaccurate, unless a row already reports the doubt."""
+    for name, state in zip(PLATFORMS, mission.geometry.both, strict=True):
         platform: Platform = getattr(mission.platforms, name)
-        path = platform.path
-        if path is not None and (name not in owners or path.samples):
-            yield from (
-                _Warned(
-                    ("platforms", name, platform.way),
-                    phrases.note("path-is-doubtful", platform=name, doubt=doubt),
-                    is_doubt=True,
-                )
-                for doubt in path.doubts
-            )
+        if platform.path is not None and has_doubtful_path(mission, name, state):
+            for doubt in platform.path.doubts:
+                note = phrases.note("path-is-doubtful", platform=name, doubt=doubt)
+                yield _Warned(("platforms", name, platform.way), note)
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
@@ -159,75 +150,31 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
 def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
     """Yield warnings about platforms that move like a satellite, but not in free fall.
 
-    The warning gives the acceleration of free fall. A path without an acceleration counts as a satellite's path if it
-    is as fast as a satellite, or if it is above 100 km and moves. Over an aperture time T, a missing acceleration a
-    moves the true path away from the straight path by aT²/8, for example 25 m in 5 s.
-
-    On any other path above 100 km that is not in free fall, errors are judged without orbital dynamics. A warning is
-    given if these dynamics may change a phase noticeably, or if errors are stated in `ric`, because their velocities
-    are then not inertial.
+    The warning gives the acceleration of free fall.
     """
-    noticeable = float(negligible_rad(mission))
-    for name in PLATFORMS:
-        platform: Platform = getattr(mission.platforms, name)
-        state, axes = platform.state, mission.scene.axes
-        if state.fall is not None:
-            continue
-        speed = float(norm(state.velocity))
-        is_unbent = platform.acceleration is None and not platform.is_of_the_earth
-        is_fast = is_unbent and speed > MAX_FLIGHT_SPEED_MPS
-        if not is_fast and state.slant_range < LEAST_FALLING_HEIGHT_M - _MAX_GROUND_HEIGHT_M:
+    axes = mission.scene.axes
+    for name, state in zip(PLATFORMS, mission.geometry.both, strict=True):
+        is_straight = flies_straight(mission, name, state)
+        if not (is_straight or does_not_fall(mission, name, state)):
             continue
         from bisar_budget.paths.earth import free_fall  # these imports take 8 ms; most missions do not need them
         from bisar_budget.paths.free_fall import departure_of
 
-        height, departure = (float(number) for number in departure_of(state, axes))
-        if not is_fast and height <= LEAST_FALLING_HEIGHT_M:
-            continue
+        platform: Platform = getattr(mission.platforms, name)
         acceleration = free_fall(plain_vector(state.position), plain_vector(state.velocity), axes)
         key: str = "speed" if platform.velocity is None else "velocity"
-        if is_fast or (is_unbent and speed > _MIN_ORBIT_SPEED_MPS):
+        if is_straight:
+            speed = float(norm(state.velocity))
             sentence = phrases.satellite_flies_straight(name, speed, acceleration, axes is not None)
-        elif (phase := _missing_phase(mission, platform, EARTH_RADIUS_M + height)) > noticeable or _is_along_orbit(
-            mission, platform
-        ):
-            sentence = phrases.satellite_does_not_fall(name, height, departure, phase, acceleration, axes is not None)
-            if not is_unbent:
-                key = platform.way if platform.is_of_the_earth else "acceleration"
         else:
-            continue
-        yield _Warned(("platforms", name, key), sentence, is_doubt=True)
-
-
-def _is_along_orbit(mission: Mission, platform: Platform) -> bool:
-    """Whether the file states errors of a platform in `ric`, where velocities are inertial only for orbits."""
-    error, common = platform.motion_error, mission.common_motion_error
-    is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
-    return is_of_platform or (common is not None and common.frame == "ric")
-
-
-def _missing_phase(mission: Mission, platform: Platform, distance: float) -> float:
-    """Upper bound on the quadratic phase that orbital dynamics add to the declared errors of a platform. [rad]
-
-    `distance` is the platform's distance from the Earth's centre. [m]
-
-    Derived here. Relative to p + vτ, the gradient of gravity and the rotation of the Earth accelerate an error by at
-    most (2μ/r³ + ω²)|δr| + 2ω|δv|. A constant acceleration a over an aperture time T causes the quadratic phase
-    2π/λ·aT²/8.
-    """
-    from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S
-
-    error, common = platform.motion_error, mission.common_motion_error
-    position, velocity = (
-        math.hypot(*(of_platform or NOWHERE)) + math.hypot(*(of_both or NOWHERE))
-        for of_platform, of_both in (
-            (error.stated("position"), common and common.position),
-            (error.stated("velocity"), common and common.velocity),
-        )
-    )
-    gradient = 2 * EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / distance**3 + ROTATION_RATE_RAD_PER_S**2
-    pushed = mission.allocation.coverage_factor * (gradient * position + 2 * ROTATION_RATE_RAD_PER_S * velocity)
-    return float(2 * math.pi / mission.radar.wavelength * pushed * mission.collection.aperture_time**2 / 8)
+            height, departure = (float(number) for number in departure_of(state, axes))
+            phase = float(missing_phase_rad(mission, name, state))
+            sentence = phrases.satellite_does_not_fall(name, height, departure, phase, acceleration, axes is not None)
+            if platform.is_of_the_earth:
+                key = platform.way
+            elif platform.acceleration is not None:
+                key = "acceleration"
+        yield _Warned(("platforms", name, key), sentence)
 
 
 # ---------------------------------------------------------------------- how errors are stated
@@ -249,28 +196,17 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
             yield _Warned(error.path, phrases.note("stated-twice", platform=error.owner))
 
 
-def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings about lever arms for which the file states no attitude error that would rotate them."""
-    for name in PLATFORMS:
-        if swings_nothing(getattr(mission.platforms, name)):
-            key = (*LEVER_ARM_KIND.section(name), "arm")
-            yield _Warned(key, phrases.note("nothing-swings-the-arm", platform=name), is_doubt=True)
-
-
-def calm_oscillators(mission: Mission) -> list[str]:
-    """List the platforms whose oscillators are sensitive to acceleration but neither vibrate nor rotate."""
-    return [
-        name
-        for name in PLATFORMS
-        if OSCILLATOR_KIND.path(name, "acceleration") in mission.places and is_unshaken(mission, name)
-    ]
-
-
-def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
-    """Yield warnings about oscillators that are sensitive to acceleration but neither vibrate nor rotate."""
-    for name in calm_oscillators(mission):
-        key = OSCILLATOR_KIND.path(name, "acceleration")
-        yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name), is_doubt=True)
+def _of_idle_entries(mission: Mission) -> Iterator[_Warned]:
+    """Yield warnings about lever arms that nothing rotates, and about oscillators that nothing accelerates."""
+    paths = dict(zip(PLATFORMS, mission.geometry.both, strict=True))
+    for name, path in paths.items():
+        if has_idle_arm(mission, name, path):
+            arm = (*LEVER_ARM_KIND.section(name), "arm")
+            yield _Warned(arm, phrases.note("nothing-swings-the-arm", platform=name))
+    for name, path in paths.items():
+        if has_calm_oscillator(mission, name, path):
+            key = OSCILLATOR_KIND.path(name, "acceleration")
+            yield _Warned(key, phrases.note("nothing-shakes-the-oscillator", platform=name))
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:

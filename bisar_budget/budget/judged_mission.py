@@ -16,11 +16,10 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import scene_edges
 from bisar_budget.arrays import Booleans, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
-from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
+from bisar_budget.budget.declarations import DECLARATIONS, groups_alike, is_asked_for, missing_declarations
 from bisar_budget.budget.dispersion_row import dispersion_rows
-from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
+from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
-from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.half_causes import HalfCause, half_causes
 from bisar_budget.budget.judged_requirements import (
     REQUIREMENT_KEYS,
@@ -32,20 +31,21 @@ from bisar_budget.budget.judged_requirements import (
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.log_rows import log_rows
+from bisar_budget.budget.mission_doubts import mission_doubts
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.staying_air import StayingAir, staying_air
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
-from bisar_budget.constants import MAX_FLIGHT_SPEED_MPS
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.error_kinds.path_kinds import StateKind
 from bisar_budget.error_kinds.registry import SPREAD_POWER
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
-from bisar_budget.geometry import BistaticGeometry, norm
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.stacked import picked
 
 _BROKEN_CODES = [CODE[name] for name in BROKEN]
 _GATES = np.array([status.gates for status in STATUS.values()])
@@ -58,7 +58,8 @@ class JudgedMission:
 
     `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers. The
     field `why` of a row gives the reason for its status if the numbers of the row do not decide it. `families` holds
-    the rows of each gating model, before the rows of both models are merged.
+    the rows of each gating model, before the rows of both models are merged. `doubts` marks the cases with each kind
+    of doubt about the mission, by the code of the warning.
     """
 
     analysis: Analysis
@@ -70,6 +71,7 @@ class JudgedMission:
     unplaced: Mapping[str, Booleans]
     air: StayingAir
     scene: JudgedScene | None
+    doubts: Mapping[str, Booleans]
     status: Codes  # of the mission in each case, (cases,)
     waivers: NDArray[np.intp]  # index in the file of each row's waiver, (rows, n); -1: no waiver
     waived_requirements: Sequence[tuple[Booleans, int]]  # waived cases, and index of waiver or -1
@@ -163,7 +165,8 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
         is_misplaced=is_misplaced,
         unjudged=air.doubted_requirements() | {key: True for half in halves for key in half.requirements},
     )
-    floor = np.min([_floor(analysis), *(state.status for state in states)], axis=0)
+    doubts = mission_doubts(mission, analysis.geometry, cases)
+    floor = np.min([_floor(analysis, doubts), *(state.status for state in states)], axis=0)
     return JudgedMission(
         analysis=analysis,
         families=families,
@@ -174,6 +177,7 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
         unplaced=drifting,
         air=air,
         scene=scene,
+        doubts=doubts,
         status=_worst(after, floor),
         waivers=waivers,
         waived_requirements=[(state.status == CODE["waived"], of_requirements[state.key]) for state in states],
@@ -299,28 +303,15 @@ def _doubted_rows(analysis: Analysis, rows: Sequence[Judged]) -> Booleans:
     return in_doubt
 
 
-def _floor(analysis: Analysis) -> Codes:
+def _floor(analysis: Analysis, doubts: Mapping[str, Booleans]) -> Codes:
     """Return the best status that each case can have, (cases,).
 
-    It is `not_evaluated` if no error is declared. It is `warn` if a path, an oscillator or a lever arm of the file is
-    doubtful. Otherwise it is `pass`.
+    It is `not_evaluated` if no error is declared, and `warn` with a doubt about the mission. Otherwise it is `pass`.
     """
-    floor, mission = np.full(analysis.cases, CODE["pass"]), analysis.mission
-    for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
-        platform = getattr(mission.platforms, name)
-        if platform.path is not None and platform.path.doubts:
-            strays_from_log = strays(mission, name) & (not platform.path.samples)
-            floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
-        if platform.acceleration is None and not platform.is_of_the_earth:
-            is_fast = np.asarray(norm(path.velocity)) > MAX_FLIGHT_SPEED_MPS
-            floor[np.broadcast_to(is_fast, floor.shape)] = CODE["warn"]
-    platforms = (getattr(mission.platforms, name) for name in PLATFORMS)
-    if calm_oscillators(mission) or any(map(swings_nothing, platforms)):
-        floor[:] = CODE["warn"]
     is_random = any(error.declared is not None for error in analysis.random)
-    if not (analysis.errors.stated or _vibrates(mission) or is_random):
-        floor[:] = CODE["not_evaluated"]
-    return floor
+    if not (analysis.errors.stated or _vibrates(analysis.mission) or is_random):
+        return np.full(analysis.cases, CODE["not_evaluated"])
+    return np.where(np.any([*doubts.values()], axis=0), CODE["warn"], CODE["pass"])
 
 
 def _worst(codes: Codes, floor: Codes) -> Codes:
@@ -361,11 +352,10 @@ class RowStatuses:
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
-        # There is nearly always one combination, because a moving platform moves in every case.
-        for still_platforms in np.unique(still, axis=1).T:
-            cases = (still == still_platforms[:, None]).all(axis=0)
-            names = [name for name, is_still in zip(PLATFORMS, still_platforms, strict=True) if is_still]
-            missing = missing_declarations(self.mission, names)
+        for cases in groups_alike(self.mission, geometry, self.status.shape[1]):
+            names = [name for name, is_still in zip(PLATFORMS, still[:, cases][:, 0], strict=True) if is_still]
+            mission = self.mission if cases.all() else picked(self.mission, np.flatnonzero(cases))
+            missing = missing_declarations(mission, names)
             self.status[0, cases] = CODE["not_evaluated" if missing else "pass"]
             owed = [any(is_asked_for(row_subject, error) for error in missing) for row_subject in self.subjects]
             self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)

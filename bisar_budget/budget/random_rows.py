@@ -270,11 +270,12 @@ class RandomRows:
             np.broadcast_to(rests_on_doubted_noise(errors_of_owner, "spread", model, most), most.shape)
             for errors_of_owner, most in zip(masked, limit, strict=True)
         ])  # fmt: skip
+        is_over_other = rms > limit_of_other * LIMIT_RATIO
         judged = self.judging.row(
             subject("mission", ISLR),
             np.where(is_declared, rms, math.nan),
             np.where(is_there, limit, math.nan),
-            doubt=(rms > limit_of_other * LIMIT_RATIO) | rests_on,
+            doubt=is_over_other | rests_on,
             is_unknown=is_in_doubt & is_there & ~(rms > limit * LIMIT_RATIO),
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
@@ -288,7 +289,7 @@ class RandomRows:
             allowable_full=by_full,
             islr_db=islr_of(mission, variance),
         ).held_to(ISLR)
-        of_rows = (members, variance, limit, limit_of_other)
+        of_rows = (members, variance, limit, limit_of_other, is_over_other, rests_on)
         for owner_index, (owner, *columns_of_owner) in enumerate(zip(owners, *of_rows, strict=True)):
             yield IslrRow(
                 judged.at(owner_index, subject(owner, ISLR)), *columns_of_owner, is_there=is_there[owner_index]
@@ -382,25 +383,27 @@ class IslrRow(FamilyRow):
     """The row for the total power spread by the errors of one owner (ISLR), for an array of cases.
 
     `variance` is the variance of the total phase [rad²]. `limit` is the rms phase [rad] that the gating model allows,
-    and `limit_of_other` is the rms phase [rad] that the other model allows.
+    and `limit_of_other` is the rms phase [rad] that the other model allows. `is_over_other` marks the cases that fail
+    under the other model, and `rests_on_masks` those that rest on noise beyond the points of a mask.
     """
 
     members: Sequence[SpreadPhase]
     variance: Floats
     limit: Floats
     limit_of_other: Floats
+    is_over_other: Booleans
+    rests_on_masks: Booleans
 
     def in_words(self, case: Case, gating: str) -> Row:
         """Build the report row for one case, including its text; `gating` names the model that judges the row."""
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
-        if math.sqrt(variance) > limit_by_other * LIMIT_RATIO:
+        if self.is_over_other[case.place]:
             doubt = phrases.note("other-model-allows", model=other_model, limit=level(limit_by_other), unit="dB")
-        elif self.judged.status[case.place] == CODE["warn"]:
+        elif self.rests_on_masks[case.place]:
             makers = [member for member in case.random if member.id in {each.row_id for each in self.members}]
-            if case.number(rests_on_masks(makers, "spread", math.sqrt(variance), limit)):
-                doubt = continuation_note(case, makers, "spread", math.sqrt(variance))
+            doubt = continuation_note(case, makers, "spread", math.sqrt(variance))
         owners = {each.owner for each in self.members}
         if self.judged.status[case.place] == CODE["fail"]:
             with_variance = [member for member in self.members if not math.isnan(case.number(member.variance))]

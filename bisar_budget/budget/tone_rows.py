@@ -358,7 +358,7 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     if vibration.spectrum is not None or vibration.sinusoidal:
         notes += _whose(mission, name)
     elif not lacks_a_spectrum(mission, name):
-        notes.append(phrases.oscillator_does_not_vibrate(flies_a_turn(mission, name)))
+        notes.append(phrases.oscillator_does_not_vibrate(bool(flies_a_turn(mission, name))))
     if any(line.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES for line in vibration.sinusoidal):
         notes.append(phrases.note("tones-have-rows", row_id=f"{name}.oscillator.acceleration"))
     if mission.synchronization is not None and mission.synchronization.interval is not None:

@@ -15,7 +15,7 @@ import click
 from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import DEFECT_EXIT_CODE, INTERRUPTED_EXIT_CODE, complain, drop_output, fail
 from bisar_budget.faults import ClusterError, MotionKindError, WorkerLostError, printable
-from bisar_budget.front.progress import SAYING
+from bisar_budget.questions.progress import SAYING
 from bisar_budget.resources import docstring, hold_files, release_files
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

@@ -86,11 +86,11 @@ def allocate(
     loaded = load_all(files, model, changes)
     if (twice := next((key for place, key in enumerate(keys) if key in keys[:place]), None)) is not None:
         raise click.UsageError(f"--for {twice}: is given twice; accepted: each key once.")
-    from bisar_budget.front import questions
+    from bisar_budget.questions import allocate as question
 
     offer = None if other is None else load_all([other], model, changes)[0]
     kept_free = None if reserve is None else reserve / 100
-    ask = partial(questions.allocate, keys=keys, reserve=kept_free, offer=offer)
+    ask = partial(question.allocate, keys=keys, reserve=kept_free, offer=offer)
     sheets = [(answer.found, answer.offer) for answer in ask_each(loaded, model, today, ask)]
     if is_mission and output is not None:  # before the report, so that a failure leaves no output
         _write_mission(sheets[0][0], output, model)

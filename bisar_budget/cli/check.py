@@ -359,7 +359,7 @@ def check(
         style = style._replace(table_width=table_width())
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if FORMATS[format_name].is_piecewise and not (named_reports or own_reports or verifying or is_drawn):
-        from bisar_budget.front.checks import pieces
+        from bisar_budget.questions.checks import pieces
 
         texts: dict[str, Piece] = {}
         for project in projects:
@@ -374,8 +374,9 @@ def check(
         statuses = {file: each.statuses for file, each in texts.items()}
     else:
         from bisar_budget.findings.mission import Report
-        from bisar_budget.front.checks import checked, drawn_by, with_work_trees
         from bisar_budget.mission.quantities import QuestionError
+        from bisar_budget.questions.checks import checked, with_work_trees
+        from bisar_budget.questions.drawn_errors import drawn_by
 
         settings: Arguments = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
         found: dict[str, MissionFindings | UnusableMission] = {}
@@ -462,7 +463,7 @@ def _options(project: Project, judged_on: date | None, today: datetime | None) -
 
 def _options_in(context: click.Context, judged_on: date | None, today: datetime | None) -> "Iterator[Override]":
     from bisar_budget.findings.requirement import Override
-    from bisar_budget.front.checks import day_origin
+    from bisar_budget.questions.outside import day_origin
 
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
@@ -529,11 +530,11 @@ def _explain(
 ) -> None:
     """Write the explanation of the row or requirement with the id `row_id`, for every mission that has it."""
     from bisar_budget.findings.row import unknown_id
-    from bisar_budget.front.checks import DAY_OF_RUN
-    from bisar_budget.front.checks import check as ask
     from bisar_budget.mission.load import load_mission
+    from bisar_budget.questions.checks import check as ask
+    from bisar_budget.questions.outside import DAY_OF_RUN
     from bisar_budget.report.explain.explanation import explain, explain_requirement
-    from bisar_budget.report.words.heading import overrides_lines
+    from bisar_budget.report.words.heading import other_overrides, wrapped_overrides
     from bisar_budget.report.words.requirements import requirement_id
 
     texts: list[str] = []
@@ -558,7 +559,7 @@ def _explain(
         else:
             continue
         shown_overrides = tuple(override for override in findings.overrides if override.origin != DAY_OF_RUN)
-        override_lines = overrides_lines(findings._replace(overrides=shown_overrides))
+        override_lines = wrapped_overrides(other_overrides(findings._replace(overrides=shown_overrides)))
         texts.append(text + "".join(f"{line}\n" for line in override_lines))
     if not texts:
         problem = closed(unknown_id(row_id, ids, files[0], "row or requirement"))

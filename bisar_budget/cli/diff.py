@@ -196,7 +196,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
 
     If a mission cannot be used, the faults of all missions are written, and the command ends.
     """
-    from bisar_budget.front.checks import check
+    from bisar_budget.questions.checks import check
     from bisar_budget.report.change.comparison import compare
 
     missions = read_all(read for pair in zip(before, after, strict=True) for read in pair)

@@ -66,8 +66,8 @@ def verify(
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
-    from bisar_budget.front.imaging import verify_all
-    from bisar_budget.front.progress import workers_of
+    from bisar_budget.questions.progress import workers_of
+    from bisar_budget.questions.verify import verify_all
 
     files = expand(missions)
     spare(files, [output])
@@ -132,10 +132,10 @@ def simulate(
     if is_paper and plot is None:
         raise click.UsageError("--paper changes the titles of --plot, which is missing.")
     spare([mission], [plot, output])
-    from bisar_budget.front import imaging
+    from bisar_budget.questions import simulate as question
 
     with wrong_usage():
-        standing = imaging.standing(targets)
+        standing = question.standing(targets)
     (loaded,) = load_all([mission], changes=changes)
     if is_phase_history:
         _export(mission, loaded, str(output), standing)
@@ -143,8 +143,8 @@ def simulate(
     from bisar_budget.report.drawing import point_plot
 
     try:
-        images = imaging.simulate(loaded, standing, image_former=image_former).images
-    except (imaging.SimulationError, ValueError) as error:
+        images = question.simulate(loaded, standing, image_former=image_former).images
+    except (question.SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
     if output is not None:
         write_file(output, point_plot.archive(images, changes))
@@ -158,7 +158,7 @@ def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -
     """Write the simulated phase history to the CPHD file `output`, and a summary of it to standard output."""
     from bisar_budget.extras import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
-    from bisar_budget.front.imaging import SimulationError
+    from bisar_budget.questions.simulate import SimulationError
 
     try:
         written = export_phase_history(loaded, standing)

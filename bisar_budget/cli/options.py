@@ -198,7 +198,7 @@ def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
     `today` is the value of `--date`. If it is None, the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
     """
     from bisar_budget.findings.requirement import Outside, Override
-    from bisar_budget.front.checks import day_of, day_origin
+    from bisar_budget.questions.outside import day_of, day_origin
 
     try:
         judged_on = day_of(today)

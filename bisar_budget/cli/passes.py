@@ -39,9 +39,9 @@ from bisar_budget.constants import MAX_DAYS
 from bisar_budget.report.words.sentences import waived_count
 
 if TYPE_CHECKING:
-    from bisar_budget.design.passes import SatellitePass
     from bisar_budget.faults import SetValue
-    from bisar_budget.front.results import PassesResult
+    from bisar_budget.findings.satellite_passes import SatellitePass
+    from bisar_budget.questions.results import PassesResult
 
 
 @click.command()
@@ -118,17 +118,17 @@ def passes(
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
     spare([mission], [None if is_folder else output, plot])
     from bisar_budget.faults import MissionError
-    from bisar_budget.front import questions
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.quantities import QuestionError
+    from bisar_budget.questions import passes as question
 
     judged_on, from_outside = day_and_outside(today)
     with wrong_usage():
-        least = questions.angle_of("--min-elevation", min_elevation, 0.0)
-        squint_rad = questions.angle_of("--squint", squint, -90.0)
+        least = question.angle_of("--min-elevation", min_elevation, 0.0)
+        squint_rad = question.angle_of("--squint", squint, -90.0)
     (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
     try:
-        result = questions.passes(
+        result = question.passes(
             loaded,
             start or None,
             days=days,
@@ -203,8 +203,8 @@ def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], 
     `texts` maps the path of each mission file to its content, in the order of `passes`.
     """
     from bisar_budget.faults import MissionError
-    from bisar_budget.front.checks import check
-    from bisar_budget.front.missions import loads
+    from bisar_budget.questions.checks import check
+    from bisar_budget.questions.missions import loads
 
     for satellite_pass, (path, text) in zip(passes, texts.items(), strict=True):
         try:

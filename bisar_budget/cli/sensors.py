@@ -130,7 +130,7 @@ def _check(names: Sequence[str], format_name: str) -> None:
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
     """JSON document with the status of each checked part file, and with its faults or its figures."""
     from bisar_budget.mission.parts import PartError
-    from bisar_budget.report.formats.json_document import fault_item
+    from bisar_budget.report.answers.check_content import fault_item
 
     parts: list[JsonObject] = []
     for file, result in checked.items():

@@ -93,13 +93,13 @@ def solve(
     code: 0, also if nothing complies but some value is waived; 1 if no value of the range and no part complies or is
     waived, or if the image refutes the limit (--verify); 2 for wrong usage or an unusable mission file.
     """
-    from bisar_budget.front import questions
+    from bisar_budget.questions import solve as question
 
     with wrong_usage():
-        questions.hold_to_parts(key, between, is_scale)
+        question.hold_to_parts(key, between, is_scale)
     files = expand(missions)
     spare(files, [output])
-    ask = partial(questions.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
+    ask = partial(question.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
     solutions = [answer.found for answer in ask_each(load_all(files, model, changes), model, today, ask)]
     deliver_answer("solve", solutions, format_name, output)
     is_broken = any(each.status == "none" or (each.imaged and each.imaged.is_optimistic) for each in solutions)
@@ -132,14 +132,14 @@ def sensitivity(
     by 1 % of the smaller slant range. With balanced shares, a second table shows how much the other errors lose if
     one error is doubled. Exit code: 0, or 2 for wrong usage or an unusable mission file.
     """
-    from bisar_budget.front import questions
+    from bisar_budget.questions import sensitivity as question
 
     kind = suffix_of(plot, PICTURE_SUFFIXES)[1:]
     files = expand(missions)
     if plot is not None and len(files) > 1:
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
-    ask = partial(questions.sensitivity, row=row)
+    ask = partial(question.sensitivity, row=row)
     results = [*ask_each(load_all(files, model, changes), model, today, ask)]
     if plot is not None:
         write_file(plot, results[0].plot().of(kind))

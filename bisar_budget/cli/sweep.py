@@ -37,7 +37,7 @@ from bisar_budget.report.answers import ANSWERS, format_of_file, suffixes
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
-    from bisar_budget.front.sweeps import SweepResult
+    from bisar_budget.questions.sweep import SweepResult
 
 _TABLE_SUFFIXES = (".csv", ".parquet", ".nc")
 MAX_UNFORCED_CASES = 100_000_000  # more need --force, since the table has tens of gigabytes
@@ -136,10 +136,10 @@ def sweep(
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.extras import MissingExtraError
-    from bisar_budget.front import questions
-    from bisar_budget.front.missions import cases_of, cases_of_texts
-    from bisar_budget.front.progress import hold_to_tables, workers_of
     from bisar_budget.mission.quantities import QuestionError, TableError
+    from bisar_budget.questions import sweep as question
+    from bisar_budget.questions.missions import cases_of, cases_of_texts
+    from bisar_budget.questions.progress import hold_to_tables, workers_of
     from bisar_budget.report.drawing.trades import check_plot
 
     (loaded,) = load_all([mission], model, changes)
@@ -159,7 +159,7 @@ def sweep(
         if plot_column is not None and "." in plot_column and plot_column not in columns:
             columns = (*columns, plot_column)
         with workers_of(scheduler, patience) as workers:
-            run = questions.sweep(
+            run = question.sweep(
                 loaded, cases, columns=columns, model=model, date=judged_on, jobs=jobs, outside=from_outside
             )
             run.workers, run.beside, run.is_resumed = workers, output if is_kept else None, is_resumed
@@ -184,7 +184,7 @@ def sweep(
 
 def _foresee(run: "SweepResult", force: bool) -> None:
     """Report the expected duration of a long sweep; refuse more than `MAX_UNFORCED_CASES` cases without `--force`."""
-    from bisar_budget.front.progress import foretell, lasting
+    from bisar_budget.questions.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
     if count > MAX_UNFORCED_CASES and not force:

@@ -11,17 +11,11 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from hashlib import sha256
 from importlib import import_module
 
-import numpy as np
-
-from bisar_budget import __version__
-from bisar_budget.design.cases import Cases
-from bisar_budget.design.sweep import Asked, Chunks
-from bisar_budget.design.table import Part
 from bisar_budget.extras import install_command
-from bisar_budget.faults import ClusterError, changes_words
+from bisar_budget.faults import ClusterError
+from bisar_budget.findings.case_table import Chunks, Part
 from bisar_budget.memory import hold_room
 from bisar_budget.resources import locked
 
@@ -43,36 +37,6 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
     except ImportError as error:
         problem = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
         raise ClusterError(problem) from None
-
-
-def question_of(asked: Asked) -> Question:
-    """Return all inputs that determine the values of parts, keyed by the description of each input in messages.
-
-    Parts with equal questions can be combined.
-    """
-    question, sweep = asked.travelling, asked.swept(iter(()))
-    has_waivers = bool(asked.table.mission.waivers)  # only waivers depend on the day
-    return {
-        "the version of bisar-budget was": __version__,
-        "the hash of the mission file was": sweep.mission_sha256[:16],
-        "the hash of what the mission names was": question.named.sha256[:16] if question.named else "",
-        "--set was": changes_words(question.changes),
-        "the model that decides was": asked.table.mission.gating_model,
-        "--date was": question.today.isoformat() if has_waivers else "",
-        "the cases were": f"{asked.cases.count} of {', '.join(sweep.varied)}",
-        "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
-        "the size of the parts was": str(asked.chunks.size),
-        "the columns were": ", ".join(column.name for column in sweep.columns),
-    }
-
-
-def _hash_of(cases: Cases) -> str:
-    """SHA-256 hash of the values that the cases give to the varied keys."""
-    digest = sha256(repr((cases.is_grid, cases.shape)).encode())
-    for values in cases.columns:
-        is_words = values.dtype == object
-        digest.update(json.dumps(values.tolist()).encode() if is_words else np.ascontiguousarray(values, "<f8").data)
-    return digest.hexdigest()
 
 
 @contextmanager

@@ -78,21 +78,18 @@ def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
     return is_heard & (np.asarray(rms if not isinstance(rms, tuple) else sum(rms)) * felt_vibration.sensitivity > 0)
 
 
-def is_unshaken(mission: Mission, name: str) -> bool:
+def is_unshaken(mission: Mission, name: str) -> PerCaseFlag:
     """Whether an oscillator is sensitive to acceleration, but the file states no vibration or turn that acts on it.
 
-    With a direct path, the result is false for the transmitter's oscillator, whose phase drops out of the data.
+    The result is a Boolean or an array (cases,). With a direct path, it is false for the transmitter's oscillator,
+    whose phase drops out of the data.
     """
     felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
-    if (
-        felt_vibration is None
-        or not is_heard
-        or not np.any(felt_vibration.sensitivity)
-        or felt_vibration.vibration.is_stated
-    ):
+    if felt_vibration is None or not is_heard or felt_vibration.vibration.is_stated:
         return False
-    return not flies_a_turn(mission, name)
+    is_sensitive = np.asarray(felt_vibration.sensitivity) != 0
+    return np.asarray(is_sensitive & ~np.asarray(flies_a_turn(mission, name)))
 
 
 class AcceleratedTone(NamedTuple):
@@ -260,11 +257,11 @@ def _falls(mission: Mission, state: PlatformState) -> PerCaseFlag:
     return norm(specific_force(mission, state)) < norm(state.acceleration)
 
 
-def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether a turn of a platform's path accelerates the platform's oscillator in at least one case."""
+def flies_a_turn(mission: Mission, name: str) -> PerCaseFlag:
+    """Whether a turn of a platform's path accelerates its oscillator, as a Boolean or an array (cases,)."""
     state: PlatformState = getattr(mission.geometry, name)
-    bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
-    return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
+    bends = np.asarray(not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2)
+    return np.asarray(bends & ~np.asarray(_falls(mission, state)))
 
 
 def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:

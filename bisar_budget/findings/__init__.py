@@ -1,4 +1,18 @@
-"""Findings of a check, as frozen data: statuses, rows, missions and verdicts of images."""
+"""Findings of a check and of every other question, as frozen data that reports show."""
 
 # Modules that other rooms may use.
-__all__ = ["images", "mission", "monte_carlo", "requirement", "row", "specification", "status", "trade"]
+__all__ = [
+    "case_table",
+    "images",
+    "mission",
+    "monte_carlo",
+    "offer",
+    "requirement",
+    "row",
+    "satellite_passes",
+    "slopes",
+    "solution",
+    "specification",
+    "status",
+    "trade",
+]

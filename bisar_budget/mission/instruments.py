@@ -320,6 +320,12 @@ class Oscillator(NamedTuple):
         return self.phase_noise is not None or bool(self.spurs)
 
     @property
+    def states_sensitivity(self) -> bool:
+        """Whether the file itself states the acceleration sensitivity, instead of taking it from a part."""
+        is_of_part = "acceleration_sensitivity" in dict(self.of_parts)
+        return self.acceleration_sensitivity is not None and not is_of_part
+
+    @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
         """Phase noise of a part that the mission overrides by a mask without a frequency; None without such a mask.
 

@@ -41,8 +41,8 @@ class Format(NamedTuple):
 
 
 _FORMAT_ENTRIES = (
-    Format("text", "formats.text_table", (".txt",), is_piecewise=True),
-    Format("json", "formats.json_document", (".json",), is_piecewise=True),
+    Format("text", "answers.check_text", (".txt",), is_piecewise=True),
+    Format("json", "answers.check_content", (".json",), is_piecewise=True),
     Format("csv", "formats.csv_table", (".csv",), is_piecewise=True),
     Format("junit", "formats.traceability", (".xml",), "test cases"),
     Format("sarif", "formats.annotations", (".sarif", ".sarif.json"), "code scanning"),

@@ -133,12 +133,15 @@ class Head:
     """The head of a table column. Its style is `number` (right-aligned), `id` or empty for text.
 
     `unit` is the unit of the numbers below it. If `medium` is `TERMINAL` or `PAGE`, only that medium has the column.
+    `width` is the smallest width of the column on a terminal. A text that `is_sentence` may be below its row there.
     """
 
     text: Text
     style: str = ""
     unit: str = ""
     medium: str = ""
+    width: int = 0
+    is_sentence: bool = False
 
 
 def page_head(head: Head) -> Text:
@@ -199,10 +202,37 @@ class Only:
 
 
 @dataclass(frozen=True, slots=True)
+class Lead:
+    """A line for a terminal that begins with a status.
+
+    A long line is broken at blanks; with `breaks`, only at blanks after these characters, or nowhere if it is empty.
+    """
+
+    status: str
+    text: str
+    breaks: str = " "
+
+
+@dataclass(frozen=True, slots=True)
+class Overrides:
+    """Settings from outside the file, for a terminal: on one line if they fit."""
+
+    texts: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Blocks for a terminal, without empty lines between them."""
+
+    blocks: Sequence["Block"]
+
+
+@dataclass(frozen=True, slots=True)
 class TextTable:
     """A table of text. The first cell of each row is the name of the row.
 
-    `label` is the accessible name of the scrolling region around the table. A narrow table has no label.
+    `label` is the accessible name of the scrolling region around the table. A narrow table has no label. On a
+    terminal, `below` has texts below each row.
     """
 
     label: str
@@ -210,6 +240,7 @@ class TextTable:
     heads: Sequence[Head]
     rows: Sequence[Sequence[Text]]
     style: str = ""
+    below: Sequence[Sequence[str]] = ()
 
     def on(self, medium: str) -> "TextTable":
         """Return the table with the columns that `medium` shows."""
@@ -305,7 +336,8 @@ class Chapter:
     is_listed: bool = True  # whether the contents list the chapter
 
 
-Block = Opening | Only | Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
+OfMedium = Only | Lead | Overrides | Close  # blocks of one medium
+Block = Opening | OfMedium | Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,7 +370,7 @@ def blocks_of(block: AnswerDocument | Block) -> Iterator[Block]:
     inner: Sequence[Block] = ()
     if isinstance(block, AnswerDocument):
         inner = block.chapters
-    elif isinstance(block, Chapter | Group | Only):
+    elif isinstance(block, Chapter | Group | Only | Close):
         inner = block.blocks
     for child in inner:
         yield child

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.design.cases import Cases, Values, in_unit
-from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.extras import MissingExtraError, install_command
 from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.case_table import Cases, Column, Part, Swept, Values, in_unit
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.memory import TABLES_MEMORY_BYTES, hold_room

@@ -733,7 +733,7 @@ class _TurnPhase:
     def __init__(self, mission: Mission, name: str) -> None:
         self.scale, T = 2 * math.pi * mission.radar.center_frequency, mission.collection.aperture_time
         self.state = getattr(mission.platforms, name).state
-        self.turns = not mission.has_direct_path and flies_a_turn(mission, name)
+        self.turns = not mission.has_direct_path and bool(flies_a_turn(mission, name))
         sync = mission.synchronization
         is_linked = sync is not None and sync.interval is not None  # lines are subtracted after drawing
         self.slow = [

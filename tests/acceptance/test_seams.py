@@ -21,7 +21,7 @@ import bisar_budget as bb
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.verdicts import with_verdicts
 from bisar_budget.findings.images import Verdict, VerifiedMission
-from bisar_budget.front.checks import day_of
+from bisar_budget.questions.outside import day_of
 from bisar_budget.report.answers.verify_answer import geometry_remarks
 from bisar_budget.simulator.realisations import drawn_errors
 from bisar_budget.simulator.targets import parse_targets

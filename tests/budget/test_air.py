@@ -17,7 +17,7 @@ from bisar_budget.report.explain.explanation import explain
 from bisar_budget.sampling.probability import monte_carlo
 from tests.conftest import TODAY, mission_text, row
 from tests.conftest import findings as found_of
-from tests.design.test_sweep import assert_as_checked, grid, swept
+from tests.questions.test_sweep import assert_as_checked, grid, swept
 from tests.report.test_report_explanation import evaluated, sums
 
 NEEDS = {"cubic_phase_error": "22.5 deg", "islr": "-20 dB", "location_error": "1 m"}

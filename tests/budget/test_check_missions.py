@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from bisar_budget.budget.check import check_mission, check_missions
-from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
@@ -19,6 +18,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, with_number
 from bisar_budget.mission.stacked import stacked
+from bisar_budget.questions.varied import scaled
 from bisar_budget.ranges.exact_ranges import POINT_SETTINGS
 from bisar_budget.ranges.limit_search import LIMIT_FRACTION
 from tests.conftest import ROOT, mission_text, seeds

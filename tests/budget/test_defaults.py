@@ -12,12 +12,12 @@ import pytest
 import yaml
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.cases import grid_of
-from bisar_budget.design.sweep import Asked
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import mission_schema
 from bisar_budget.mission.quantities import tree_of
+from bisar_budget.questions.asked import Asked
+from bisar_budget.questions.cases import grid_of
 from tests.conftest import BASE, PAPER, ROOT, TODAY, row
 
 SQUINT = math.radians(50)  # of the transmitter, which flies level

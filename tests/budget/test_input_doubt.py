@@ -17,10 +17,10 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.paths.instant import Instant
 from bisar_budget.units import format_quantity
 from tests.conftest import TODAY, mission_text, row
-from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight, geodetic_csv
 from tests.paths.orbit_files import EPOCH, TLE, oem
+from tests.questions.test_sweep import assert_as_checked, grid, swept
 
 AXES = "xyz"
 

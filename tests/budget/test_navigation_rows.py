@@ -5,8 +5,8 @@ import math
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis, Case
-from bisar_budget.design.varied import scaled
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.questions.varied import scaled
 from bisar_budget.sampling.probability import monte_carlo
 from bisar_budget.simulator.point import declared_errors
 from tests.conftest import findings, mission_text, row

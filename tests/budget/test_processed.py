@@ -19,9 +19,9 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.paths.flight import smoothed
 from bisar_budget.report.explain.explanation import explain
 from tests.conftest import TODAY, examples, row
-from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft
 from tests.paths.flown import Flight, flight, geodetic_csv
+from tests.questions.test_sweep import assert_as_checked, grid, swept
 
 RESIDUAL, GRID = "receiver.trajectory.residual", "receiver.trajectory.grid"
 BOTH = ("smoothed", "raw")

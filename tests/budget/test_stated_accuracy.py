@@ -16,12 +16,12 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from tests.budget.test_input_doubt import statuses
 from tests.conftest import TEXT_FORMATS, TODAY, row
-from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight, geodetic_csv
 from tests.paths.log_files import GPS_OF_OLD, SIGMAS, gga, gps_records, nmea, sentence, solution, topic, ulog
 from tests.paths.orbit_files import EPOCH, TLE, oem, omm_with_covariance
 from tests.paths.test_accuracy import START, triangle, with_covariance
+from tests.questions.test_sweep import assert_as_checked, grid, swept
 
 CENTER = "2026-06-01T05:19:30Z"
 RIC = ("radial", "in_track", "cross_track")

@@ -19,7 +19,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
 from tests.conftest import examples, mission_text, row
 from tests.conftest import findings as found_of
-from tests.design.test_sweep import assert_as_checked, grid, swept
+from tests.questions.test_sweep import assert_as_checked, grid, swept
 
 NEEDS = {
     "quadratic_phase_error": "360 deg",

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from bisar_budget.design.allocate import allocate
+import bisar_budget as bb
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing.share_bars import limiting, share_bars
 from bisar_budget.report.words.key_names import in_words
@@ -65,7 +65,7 @@ class TestSheet:
             assert one["text"] in text
 
     def test_the_drawing_has_a_bar_for_each_row_that_limits(self) -> None:
-        sheet = allocate(parse_mission(mission_text(**RSS)), today=TODAY)
+        sheet = bb.allocate(parse_mission(mission_text(**RSS)), date=TODAY).found
         drawing = ElementTree.fromstring(share_bars(sheet))
         texts = ["".join(text.itertext()) for text in drawing.iter() if text.tag.endswith("text")]
         rows = limiting(sheet)

@@ -748,12 +748,12 @@ class TestBounds:
     )
     def test_how_long_a_question_takes_is_said(self, monkeypatch, question) -> None:
         """Each value is a whole check: of a mission that takes 0.6 s, minutes went by in silence."""
-        monkeypatch.setattr("bisar_budget.front.progress.MIN_ANNOUNCED_S", 1e-9)
+        monkeypatch.setattr("bisar_budget.questions.progress.MIN_ANNOUNCED_S", 1e-9)
         done = run(*question, SECTION_V)
         assert done.returncode == 0
         said = rb"Checking Rigling & Moses, Section V for \d+ values or more will take about .*; .*--model published"
         assert re.match(said, done.stderr)
-        monkeypatch.setattr("bisar_budget.front.progress.MIN_ANNOUNCED_S", 3600)
+        monkeypatch.setattr("bisar_budget.questions.progress.MIN_ANNOUNCED_S", 3600)
         assert run(*question, SECTION_V).stderr == b""
 
     def test_a_table_of_cases_without_end(self) -> None:
@@ -765,7 +765,7 @@ class TestBounds:
         )
 
     def test_a_table_of_cases_that_is_too_large(self, tmp_path, monkeypatch) -> None:
-        from bisar_budget.design import cases
+        from bisar_budget.questions import cases
 
         monkeypatch.setattr(cases, "MAX_TABLE_CHARACTERS", 1 << 20)
         (tmp_path / "cases.csv").write_bytes(b"0" * ((1 << 20) + 1))

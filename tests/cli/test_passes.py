@@ -13,18 +13,19 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bisar_budget.design.passes import passes, start_of
+import bisar_budget as bb
 from bisar_budget.mission.load import load_mission
+from bisar_budget.questions.passes import start_of
 from bisar_budget.report import Style
 from bisar_budget.report.answers import passes_answer as pass_list
 from bisar_budget.report.answers import written
 from bisar_budget.report.answers.passes_answer import _folded as folded
 from tests.conftest import ROOT, TODAY
-from tests.design.test_passes import ROOF, tree
 from tests.drawing import Drawing
 from tests.fuzz import RAW, RUN
 from tests.paths.orbit_files import LINE_1, LINE_2, TLE
 from tests.paths.test_visibility import ephemeris
+from tests.questions.test_passes import ROOF, tree
 
 BESANCON = ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"
 SPAN = ("--from", "2021-03-20", "--days", "1")
@@ -125,7 +126,7 @@ class TestList:
 def test_a_use_without_a_number_is_null_and_one_pass_is_said_as_one(tmp_path: Path) -> None:
     """Where an error moves the image out of sight its use is infinite."""
     mission = load_mission(str(BESANCON), is_placed=False)
-    found = passes(mission, start_of("2021-03-20"), days=0.4, today=TODAY)
+    found = bb.passes(mission, "2021-03-20", days=0.4, date=TODAY).found
     (one,) = found.found
     assert pass_list.verdict(found).startswith("one pass, which complies: transmitter above 20 deg and at broadside,")
     lost = found._replace(found=(one._replace(utilization=math.inf, status="fail", requirement=None, row=None),))

@@ -19,10 +19,10 @@ from typing import Any
 
 import pytest
 
-from bisar_budget.design import sweep as engine
-from bisar_budget.design.table import Part
-from bisar_budget.front.progress import lasting
-from bisar_budget.front.sweeps import percentage
+from bisar_budget.findings.case_table import Part
+from bisar_budget.questions import asked as engine
+from bisar_budget.questions.progress import lasting
+from bisar_budget.questions.sweep import percentage
 from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -286,7 +286,7 @@ def test_a_terminal_has_a_bar(tmp_path: Path) -> None:
 
 def watched_soon(*arguments: str) -> list[str]:
     """A command that has a bar after a tenth of a second; what follows is as long as that takes."""
-    imports = "from bisar_budget.cli import main; from bisar_budget.front import progress"
+    imports = "from bisar_budget.cli import main; from bisar_budget.questions import progress"
     code = f"{imports}; progress._MIN_SHOWN_S = 0.1; main()"
     return [sys.executable, "-c", code, *arguments]
 

@@ -15,8 +15,8 @@ pytest.importorskip("pyarrow")
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.cluster.scheduler import Workers, connected
-from bisar_budget.front import checks, progress
 from bisar_budget.mission.load import load_mission
+from bisar_budget.questions import drawn_errors, progress
 from bisar_budget.sampling import draws as drawing
 from bisar_budget.sampling.draws import Drawing, in_turn, joined, shared_out
 from bisar_budget.sampling.probability import monte_carlo
@@ -134,7 +134,7 @@ def test_a_terminal_has_a_bar() -> None:
 
 def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the time of some of them, shared by as many threads as there are."""
-    monkeypatch.setattr(checks, "_MANY_DRAWS", 10_000)
+    monkeypatch.setattr(drawn_errors, "_MANY_DRAWS", 10_000)
     monkeypatch.setattr(progress, "_LEAST_TRIAL_S", 0.001)
     monkeypatch.setattr(progress, "MIN_ANNOUNCED_S", 0.0)
     found = run("check", "-q", DRONES, "--monte-carlo", "20e3")

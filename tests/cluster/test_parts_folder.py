@@ -17,13 +17,13 @@ import pytest
 pytest.importorskip("pyarrow")
 
 from bisar_budget import __version__
-from bisar_budget.cluster.parts_folder import PartsFolder, parts_folder, question_of
-from bisar_budget.design.cases import grid
-from bisar_budget.design.sweep import Asked, Chunks
-from bisar_budget.design.table import Part
+from bisar_budget.cluster.parts_folder import PartsFolder, parts_folder
 from bisar_budget.faults import ClusterError
+from bisar_budget.findings.case_table import Chunks, Part
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import tree_of
+from bisar_budget.questions.asked import Asked
+from bisar_budget.questions.cases import grid
 from tests.conftest import ROOT, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -63,7 +63,7 @@ def test_words_of_cases_are_part_of_the_question() -> None:
 
     def question(text: str) -> Mapping[str, str]:
         asked = Asked(mission, grid(tree_of(mission), [text, f"{TIME}=1,2s"]), today=date(2026, 1, 1))
-        return question_of(asked)
+        return asked.inputs
 
     one, other = question("allocation.model=published,full"), question("allocation.model=full,published")
     assert one["the cases were"] == f"4 of allocation.model, {TIME}"
@@ -304,7 +304,7 @@ def test_parts_of_another_mission_or_version_are_refused(
     mission.write_text(text.replace("300 MHz", "150 MHz"), encoding="utf-8")
     assert "another sweep: the hash of the mission file was " in run(*again).stderr
     mission.write_text(text, encoding="utf-8")
-    monkeypatch.setattr("bisar_budget.cluster.parts_folder.__version__", "9.9")
+    monkeypatch.setattr("bisar_budget.questions.asked.__version__", "9.9")
     assert f"another sweep: the version of bisar-budget was {__version__}, and now 9.9\n" in run(*again).stderr
     monkeypatch.undo()
     assert run(*again).exit_code == 0

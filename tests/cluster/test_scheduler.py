@@ -23,12 +23,13 @@ from bisar_budget.cli import cli
 from bisar_budget.cli.streams import complain
 from bisar_budget.cluster import scheduler
 from bisar_budget.cluster.scheduler import Workers
-from bisar_budget.design import sweep
-from bisar_budget.design.cases import grid
-from bisar_budget.design.sweep import Asked, Chunks, part_of
 from bisar_budget.faults import ClusterError
+from bisar_budget.findings.case_table import Chunks
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import tree_of
+from bisar_budget.questions import asked as engine
+from bisar_budget.questions.asked import Asked, part_of
+from bisar_budget.questions.cases import grid
 from bisar_budget.verifier.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until
 from tests.conftest import APART, ROOT, heed_signals
@@ -50,8 +51,8 @@ CASES, PARTS = 4, 64  # in a part, and parts
 IMPATIENT = f"""
 from bisar_budget.cli import main
 from bisar_budget.cluster import scheduler
-from bisar_budget.design import sweep
-sweep._READ_PART_CASES, scheduler._LOOK_PERIOD_S, scheduler._FETCH_TIMEOUT_S = {CASES}, 0.5, 2.0
+from bisar_budget.questions import asked as engine
+engine._READ_PART_CASES, scheduler._LOOK_PERIOD_S, scheduler._FETCH_TIMEOUT_S = {CASES}, 0.5, 2.0
 main()
 """
 
@@ -60,7 +61,7 @@ main()
 def small_parts() -> Iterator[None]:
     """Parts of commands in this process too."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(sweep, "_READ_PART_CASES", CASES)
+        patched.setattr(engine, "_READ_PART_CASES", CASES)
         yield
 
 

@@ -21,8 +21,8 @@ import bisar_budget as bb
 from bisar_budget.cli import cli
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
-from bisar_budget.front.imaging import SimulationError
 from bisar_budget.mission.model import Mission
+from bisar_budget.questions.simulate import SimulationError
 from bisar_budget.report.drawing import point_plot
 from tests.conftest import APART
 from tests.contract.error_keys import (

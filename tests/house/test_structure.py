@@ -45,10 +45,9 @@ FLOORS = [
     {"simulator"},
     {"verifier"},
     {"formats"},
-    {"design"},
     {"cluster"},
     {"report"},
-    {"front"},
+    {"questions"},
     {"cli"},
     {"__main__"},
 ]
@@ -108,7 +107,7 @@ def test_no_name_of_the_front_door_is_that_of_a_room() -> None:
 
 
 # Rooms that compute; the command line asks the front door instead.
-ENGINES = {"ranges", "effects", "analysis", "sampling", "budget", "simulator", "verifier", "design", "cluster"}
+ENGINES = {"ranges", "effects", "analysis", "sampling", "budget", "simulator", "verifier", "cluster"}
 
 
 def imported_for_use(path: Path) -> set[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bisar_budget.design.sensitivity import sensitivity
+import bisar_budget as bb
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.quantities import QuestionError, number_of, range_of, tree_of
@@ -72,7 +72,7 @@ def test_nobody_sweeps_below_a_coverage_factor_of_one(run: Callable, tmp_path: P
 
 def test_at_a_coverage_factor_of_one_a_slope_is_that_above() -> None:
     changes = {"platforms__receiver__motion_error__velocity": "1 mm/s", "allocation__coverage_factor": "1"}
-    found = sensitivity(parse_mission(mission_text(**changes), "m.yaml"), today=TODAY)
+    found = bb.sensitivity(parse_mission(mission_text(**changes), "m.yaml"), date=TODAY)
     (slope,) = (slope for slope in found.slopes if slope.key == "allocation.coverage_factor")
     assert slope.difference == "forward"
     assert slope.change == pytest.approx(0.01 * found.utilization, rel=1e-6)

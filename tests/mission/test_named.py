@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bisar_budget.design.cases import grid, words_of
-from bisar_budget.design.sweep import Asked, part_of
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, named_by
 from bisar_budget.mission.quantities import tree_of
+from bisar_budget.questions.asked import Asked, part_of
+from bisar_budget.questions.cases import grid, words_of
 from tests.conftest import ROOT
 
 MISSIONS = ROOT / "specs" / "missions"

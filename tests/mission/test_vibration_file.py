@@ -5,12 +5,12 @@ import math
 import pytest
 
 from bisar_budget.constants import STANDARD_GRAVITY_MPS2
-from bisar_budget.design.varied import scaled
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission, mission_schema
 from bisar_budget.mission.quantities import number_of, tree_of
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, Sinusoid
+from bisar_budget.questions.varied import scaled
 from tests.conftest import mission_text
 
 G = STANDARD_GRAVITY_MPS2

@@ -15,9 +15,9 @@ import pytest
 from skyfield.api import EarthSatellite, wgs84
 
 import bisar_budget as bb
-from bisar_budget.front.results import PassesResult
 from bisar_budget.paths import elements
 from bisar_budget.paths.elements import element_sets, read_tle
+from bisar_budget.questions.results import PassesResult
 from tests.conftest import ROOT, TODAY
 from tests.outside.record import compare
 from tests.paths.orbit_files import CENTER

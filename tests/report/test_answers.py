@@ -103,6 +103,19 @@ def test_the_numbers_of_a_workbook_are_those_of_the_json_document() -> None:
         )
 
 
+@pytest.mark.parametrize("command", [command for command in ANSWERS if command != "diff"])
+def test_another_reader_of_workbooks_reads_the_same(command: str) -> None:
+    """Calamine shares no code with openpyxl, which writes the workbooks."""
+    calamine = pytest.importorskip("python_calamine")
+    content = bytes(written(command, "xlsx", answers()[command].answers, Style()))  # type: ignore[arg-type]
+    book, other = load_workbook(io.BytesIO(content)), calamine.CalamineWorkbook.from_filelike(io.BytesIO(content))
+    assert other.sheet_names == book.sheetnames
+    for sheet in book:
+        values = [[cell.value for cell in line] for line in sheet.iter_rows()]
+        read = other.get_sheet_by_name(sheet.title).to_python(skip_empty_area=False)
+        assert [[None if value == "" else value for value in line] for line in read] == values
+
+
 def test_a_text_that_looks_like_a_formula_stays_a_text_in_a_workbook() -> None:
     """A name such as `=1+1` would be computed by the program that opens the workbook."""
     book = load_workbook(io.BytesIO(bytes(written("solve", "xlsx", answers()["solve"].answers, Style()))))

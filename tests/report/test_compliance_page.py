@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bisar_budget.findings.mission import Report, UnusableMission
-from bisar_budget.front.checks import with_studies
+from bisar_budget.questions.checks import with_studies
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, findings, found_in
 from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, illustrated

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
+import bisar_budget as bb
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.inputs import input_files
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.report import Style, render
+from bisar_budget.report.answers import written
 from bisar_budget.report.compliance.summary import compliance
 from tests.conftest import ROOT, findings, found_in, mission_text
 from tests.page import read_page
@@ -127,3 +129,24 @@ def test_the_overview_has_the_smallest_margin_of_each_requirement() -> None:
     assert margins["Location error"][0] == "148 %"
     assert margins["Location error"][3] == missions[0].name
     assert margins["Quadratic phase error"][3] == missions[1].name
+
+
+def test_a_requirement_that_nothing_judges_follows_the_smallest_margins() -> None:
+    """It was left out, as if it were not required."""
+    quiet = findings(requirements__location_error="10 m", requirements__islr="-20 dB")
+    judged = found_in(ROOT / "specs" / "missions" / "uav_stim300.yaml")
+    text = render("html", Report("1", (quiet, judged)), Style())
+    margins = table_with(read_page(text), "requirement", "largest use", "mission")
+    of_islr = [cells[1:5] for cells in margins if cells[0] == "ISLR"]
+    assert of_islr[0][0].endswith("%")
+    assert of_islr[0][3] == judged.name
+    assert of_islr[1] == ["not evaluated", "–", "–", quiet.name]
+    assert margins[-1][0] == "ISLR"
+
+
+@pytest.mark.parametrize("names", [["tandem_x"], ["tandem_x", "astra_drone"]])
+def test_contents_have_more_than_one_entry(names: list[str]) -> None:
+    missions = [bb.load(ROOT / "specs" / "missions" / f"{name}.yaml") for name in names]
+    answers = [bb.sensitivity(mission, date="2026-01-01").found for mission in missions]
+    text = str(written("sensitivity", "html", answers, Style()))
+    assert ("Contents" in text) == (len(names) > 1)

@@ -11,7 +11,7 @@ import pytest
 
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.requirement import Override
-from bisar_budget.front.checks import with_work_trees
+from bisar_budget.questions.checks import with_work_trees
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, found_in
 from tests.printed import PrintedPage, printed_pages

@@ -815,7 +815,9 @@ def test_what_rows_say_alike_stands_once() -> None:
 def test_a_row_that_is_not_evaluated_has_no_margin() -> None:
     """What could not be evaluated has no use of its limit, so it has no margin to it."""
     found = findings(timing_error__quadratic=1e-14)
-    rows = tuple(row._replace(status="not_evaluated") if row.declared else row for row in found.rows)
+    rows = tuple(
+        row._replace(status="not_evaluated", is_unjudged=True) if row.declared else row for row in found.rows
+    )
     line = matrix(compliance(report(found._replace(rows=rows)), Style()))["timing.quadratic"]
     assert (line["Status"], line["Utilization"], line["Margin"]) == ("not_evaluated", "–", "–")
     assert line["Allowable"] != "no limit"

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from bisar_budget.design.allocate import allocate
+import bisar_budget as bb
 from bisar_budget.findings.specification import Broken
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style
@@ -24,7 +24,7 @@ def text_of(found) -> str:
 
 
 def sheet(reserve: float):
-    return allocate(parse_mission(MISSION), keys=KEYS, reserve=reserve, today=TODAY)
+    return bb.allocate(parse_mission(MISSION), keys=KEYS, reserve=reserve, date=TODAY).found
 
 
 @pytest.mark.parametrize("used", [0.4, 0.5, 0.87654, 0.95, 0.9989, 0.99951, 0.999995, 0.9999985])

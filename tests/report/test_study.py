@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.front.checks import with_studies
+from bisar_budget.questions.checks import with_studies
 from bisar_budget.report.drawing.trades import level_lines
 from tests.conftest import ROOT
 from tests.drawing import Drawing

@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bisar_budget as bb
-from bisar_budget.design.cases import Cases, grid, grid_of, table
-from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.extras import MissingExtraError
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.case_table import Cases, Column, Part, Swept, Values
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
+from bisar_budget.questions.cases import grid, grid_of, table
 from bisar_budget.report import tables
 from bisar_budget.report.tables import TABLES, Described, slabs, writer_of
 from tests.conftest import ROOT

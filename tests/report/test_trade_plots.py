@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from bisar_budget.design.cases import grid
-from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.faults import SetValue
+from bisar_budget.findings.case_table import Column, Part, Swept
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
+from bisar_budget.questions.cases import grid
 from bisar_budget.report.drawing.figure import drawing_file
 from bisar_budget.report.drawing.svg import KEY_FONT_RATIO, text_width
 from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing

@@ -13,7 +13,7 @@ import pytest
 from click.testing import Result
 
 import bisar_budget as bb
-from bisar_budget.design.solve import Crossing, Solution, State
+from bisar_budget.findings.solution import Crossing, Solution, State
 from bisar_budget.findings.status import RANK, STATUS, complying, exit_code
 from bisar_budget.report import Style
 from bisar_budget.report.answers import written

@@ -207,7 +207,7 @@ class TestTime:
 
     @pytest.mark.parametrize("command", ["verify", "simulate"])
     def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
-        monkeypatch.setattr("bisar_budget.front.progress.MIN_ANNOUNCED_S", 1e-9)
+        monkeypatch.setattr("bisar_budget.questions.progress.MIN_ANNOUNCED_S", 1e-9)
         monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST_IMAGE_S", 1e3)
         result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
         (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]

@@ -11,8 +11,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.findings.images import CHIP_FLOOR_DB, ImageEvidence, Verdict
 from bisar_budget.findings.mission import Report
-from bisar_budget.front.checks import checked
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.questions.checks import checked
 from bisar_budget.report import Style, render
 from bisar_budget.simulator.collection import RANGE_CELLS
 from bisar_budget.simulator.phase_history import Errors
@@ -228,7 +228,7 @@ class TestRowsWorthShowing:
 @pytest.mark.parametrize("illustrated", [True, False])
 def test_only_a_report_that_shows_images_keeps_them(illustrated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "bisar_budget.front.imaging.verify_all",
+        "bisar_budget.questions.verify.verify_all",
         lambda missions, *_: [verify_mission(m, "transmitter.acceleration.x") for m in missions],
     )
     (mission,) = checked([str(SECTION_V)], TODAY, is_verified=True, is_illustrated=illustrated)

@@ -30,7 +30,7 @@ def one_row_verified(monkeypatch):
 
     def only(rows: str) -> None:
         monkeypatch.setattr(
-            "bisar_budget.front.imaging.verify_all",
+            "bisar_budget.questions.verify.verify_all",
             lambda missions, *_: [verify_mission(mission, rows) for mission in missions],
         )
 

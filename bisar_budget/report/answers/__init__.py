@@ -112,7 +112,7 @@ def files(
     if format_name in ANSWERS[command].own_formats:
         return {path: getattr(module, f"as_{format_name}")(answers, style)}
     if format_name == "json":
-        from bisar_budget.report.formats.json_document import document_text
+        from bisar_budget.report.renderers.json import document_text
 
         return {path: document_text(f"bisar-budget/{command}/1", module.content(answers))}
     if format_name == "csv":

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from bisar_budget import __version__
-from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
+from bisar_budget.findings.offer import Offer, OfferedFigure
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
@@ -17,9 +17,9 @@ from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening, requirement_table
 from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
-from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.formats.strictdoc import StrictNode, strict_document, strict_uid
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.identity import Identity, distinct, identities

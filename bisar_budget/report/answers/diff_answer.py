@@ -9,6 +9,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item
 from bisar_budget.report.answers.shared_blocks import mission_document
 from bisar_budget.report.change.comparison import (
     Change,
@@ -18,7 +19,6 @@ from bisar_budget.report.change.comparison import (
     Moved,
     Refusal,
 )
-from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.words.heading import file_words, other_overrides
 from bisar_budget.report.words.sentences import counted, percent, row_size
 from bisar_budget.units import format_quantity

@@ -7,7 +7,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.formats.json_document import monte_carlo_item
+from bisar_budget.report.answers.check_content import monte_carlo_item
 from bisar_budget.report.words.requirements import probability_words
 from bisar_budget.report.words.sentences import sentence
 from bisar_budget.units import format_quantity

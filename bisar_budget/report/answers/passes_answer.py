@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
 from bisar_budget import __version__
-from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.satellite_passes import Passes, SatellitePass
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
 from bisar_budget.report.drawing.sky_plot import sky_plot
-from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.sentences import (

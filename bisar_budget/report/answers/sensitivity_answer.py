@@ -4,15 +4,15 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.design.sensitivity import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.faults import printable
+from bisar_budget.findings.slopes import MIN_SHOWN_CHANGE_FRACTION, Relaxed, Sensitivity, Slope
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
 from bisar_budget.report.drawing.tornado import tornado
-from bisar_budget.report.formats.json_document import outside_item
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent
 
 

@@ -6,6 +6,7 @@ from itertools import zip_longest
 from bisar_budget import __version__
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
@@ -44,21 +45,29 @@ def mission_document(
     return doc.AnswerDocument(__version__, subject, facts, margins, chapters, title=title)
 
 
-def requirement_table(findings: MissionFindings) -> doc.TextTable:
-    """Make the table of requirements of a mission."""
-    heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), "status", "decided by")
+def requirement_table(findings: MissionFindings, *, has_texts: bool = False) -> doc.TextTable:
+    """Make the table of requirements of a mission.
+
+    If `has_texts`, the ids and texts of the project are below each requirement instead of beside its name.
+    """
+    decided = doc.Head("decided by", is_sentence=True)
+    status = doc.Head("status", width=max(len(status.text) for status in STATUS.values()))
+    heads = doc.heads("requirement", *doc.numbers("allowed", "reached", "use"), status, decided)
+    lines = list(requirement_lines(findings))
+    below = [[*filter(None, (own_id(line.requirement).strip(), *line.texts))] for line in lines]
     rows: list[doc.Line] = [
         [
-            f"{line.name}{own_id(line.requirement)}",
+            line.name if has_texts else f"{line.name}{own_id(line.requirement)}",
             line.allowed,
             line.reached,
             line.use,
             doc.Badge(line.status),
             _decided_by(line),
         ]
-        for line in requirement_lines(findings)
+        for line in lines
     ]
-    return doc.TextTable("Requirements", "Requirements and their verdicts", heads, rows)
+    caption = "Requirements and their verdicts"
+    return doc.TextTable("Requirements", caption, heads, rows, below=below if has_texts else ())
 
 
 def _decided_by(line: RequirementLine) -> doc.Text:

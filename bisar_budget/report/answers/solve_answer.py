@@ -2,17 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.design.compare import Comparison, PartState
-from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
+from bisar_budget.findings.solution import Comparison, Crossing, Imaged, PartState, Solution, State
 from bisar_budget.findings.status import STATUS
 from bisar_budget.json_types import JsonDocument
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item, verdict_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
-from bisar_budget.report.formats.json_document import outside_item, verdict_item
 from bisar_budget.report.words.sentences import percent, use_words, waived_count, waiver_names
 from bisar_budget.units import format_quantity
 
@@ -184,7 +183,12 @@ def _crossing(crossing: Crossing) -> dict[str, object]:
 
 
 def _state(state: State) -> dict[str, object]:
-    return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
+    return {
+        **state._asdict(),
+        "reason": state.reason or None,
+        "waived_by": list(state.waived_by),
+        "doubts": list(state.doubts),
+    }
 
 
 # ---------------------------------------------------------------- for people
@@ -352,6 +356,8 @@ def _state_words(state: State) -> str:
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
         return f"{word}, {printable(state.reason)}"
+    if state.row is None and state.doubts and state.requirement is None:
+        return f"{word}, {', '.join(state.doubts)}"
     if state.row is None:
         return f"{word}, {_undecided(state.requirement)}"
     use = "" if state.utilization is None else f" uses {percent(state.utilization)}"

@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.design.cases import Values
-from bisar_budget.design.table import Column, Part
 from bisar_budget.faults import SetValue, printable
+from bisar_budget.findings.case_table import Column, Part, Values
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
@@ -133,10 +132,11 @@ def _listed(swept: SweptCases, varied: Sequence[Column], count: int) -> Iterator
         values = [_shown(case[column.name]) for column in varied]
         status = str(case["status"])
         requirement = BINDING_WORDS.get(str(case["binding_requirement"]), case["binding_requirement"])
-        decided = printable(str(case["worst_row"] or case.get("reason") or "–"))
+        decided = [case["worst_row"] or case["reason"], case["doubts"] if status == "warn" else None]
+        decided_by = printable(", ".join(str(text) for text in decided if text) or "–")
         use = case["utilization"]
         use_text = use_words(use if isinstance(use, float) else None)
-        rows.append([*values, doc.Badge(status), use_text, decided, str(requirement or "–")])
+        rows.append([*values, doc.Badge(status), use_text, decided_by, str(requirement or "–")])
     yield doc.TextTable("Cases", "Cases of the study", heads, rows)
     if len(cases) > count:
         yield doc.Paragraph(f"{len(cases) - count} more cases: CSV, JSON and the workbook have all of them.")

@@ -7,8 +7,8 @@ from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
+from bisar_budget.report.answers.check_content import outside_item, verdict_item
 from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening
-from bisar_budget.report.formats.json_document import outside_item, verdict_item
 from bisar_budget.units import format_limit, format_quantity
 
 _VERDICT_WORDS = {

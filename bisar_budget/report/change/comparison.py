@@ -14,7 +14,7 @@ from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import OF_MISSION, Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
@@ -608,8 +608,8 @@ def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[R
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:
-    """Whether a status became worse: fail after any other status, or not evaluated after any status except fail."""
-    return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
+    """Whether a status became worse and breaks a requirement: fail, or not evaluated after any status except fail."""
+    return after in BROKEN and (before is None or RANK[after] < RANK[before])
 
 
 def _worse(status: str | None) -> str:

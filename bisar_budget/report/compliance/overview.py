@@ -5,9 +5,12 @@ from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES, JudgedRequirement
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.requirements import requirement_lines
 from bisar_budget.report.words.sentences import dashed, sentence, use_words, waiver_names
+
+_MAX_NAMED_MISSION_COUNT = 3  # of a requirement that is not evaluated
 
 
 class OverviewEntry(NamedTuple):
@@ -71,7 +74,10 @@ def _use(requirement: JudgedRequirement) -> float | None:
 
 
 def _margins(entries: Sequence[OverviewEntry], keys: Sequence[str]) -> Iterator[doc.Line]:
-    """Yield a line for each requirement with the largest utilization, and with its mission and row."""
+    """Yield a line for each requirement with the largest utilization, and with its mission and row.
+
+    Lines of requirements that some missions cannot judge follow, with these missions.
+    """
     for key in keys:
         judged = [
             (use, entry, line)
@@ -86,3 +92,20 @@ def _margins(entries: Sequence[OverviewEntry], keys: Sequence[str]) -> Iterator[
         mission = doc.Name(entry.name, entry.anchor)
         decided: doc.Text = doc.Styled("id", doc.Name(row)) if row else "–"
         yield sentence(line.name), use_words(use), dashed(line.reached), dashed(line.allowed), mission, decided
+    for key in keys:
+        unjudged = [entry for entry in entries if _is_unjudged(entry.requirement(key))]
+        if unjudged:
+            name = sentence(REQUIREMENT_NAMES[key])
+            yield name, STATUS["not_evaluated"].words, "–", "–", _missions(unjudged), "–"
+
+
+def _is_unjudged(requirement: JudgedRequirement | None) -> bool:
+    return requirement is not None and requirement.status == "not_evaluated" and _use(requirement) is None
+
+
+def _missions(entries: Sequence[OverviewEntry]) -> doc.Text:
+    """Links to the chapters of missions, or their number if there are many."""
+    if len(entries) > _MAX_NAMED_MISSION_COUNT:
+        return f"{len(entries)} missions"
+    names = [(", " if number else "", doc.Name(entry.name, entry.anchor)) for number, entry in enumerate(entries)]
+    return tuple(names)

@@ -130,7 +130,7 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
                 (dashed(use_words(use)), doc.Use(use, row.status)),
                 dashed(row_size(row.declared, row, page.findings)),
                 dashed(allowable_words(row, page.findings)),
-                "–" if row.status == "not_evaluated" else margin(row),
+                "–" if row.is_unjudged else margin(row),
                 source_of_limit(page, row),
                 method(row, verdicts.get(row.id)),
                 doc.Styled("waiver", waiver) if waiver else "–",

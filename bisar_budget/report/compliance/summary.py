@@ -156,7 +156,7 @@ def _waived(findings: MissionFindings) -> tuple[int, int]:
     A waived requirement is counted only if none of its rows is waived.
     """
     rows = [row for row in findings.rows if row.status == "waived"]
-    over = sum((row.utilization or 0.0) > 1 for row in rows)
+    over = sum(not row.is_unjudged for row in rows)
     return over, len(rows) - over + sum(requirement.status == "waived" for requirement in unseen(findings))
 
 

@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
 
-from bisar_budget.design.passes import Passes, SatellitePass, bearing
 from bisar_budget.faults import printable
+from bisar_budget.findings.satellite_passes import Passes, SatellitePass, bearing
 from bisar_budget.findings.status import RANK
 from bisar_budget.paths.instant import DAY_S, Instant
 from bisar_budget.report.drawing import svg

@@ -4,8 +4,8 @@ Each bar shows the effect of a change of 1 %: 1 % of the number itself, of a rad
 slant range.
 """
 
-from bisar_budget.design.sensitivity import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
+from bisar_budget.findings.slopes import COMPARED_CHANGE_FRACTION, Sensitivity, Slope
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.words.key_names import in_words, key_beside
 from bisar_budget.report.words.sentences import percent

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.arrays import Floats, NumbersOrWords
-from bisar_budget.design.cases import Cases, Values
-from bisar_budget.design.table import Column, Part
+from bisar_budget.findings.case_table import Cases, Column, Part, Values
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION

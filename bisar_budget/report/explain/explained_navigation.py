@@ -6,7 +6,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.design.varied import scaled
 from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.navigation_errors import body_axes, specific_force
@@ -135,7 +134,9 @@ def _derivatives(mission: Mission, navigation: Navigation, error: RandomError, b
     figures, varied = list(navigation.figures), mission
     for row, figure in enumerate(figures, 1):
         factors = np.where(np.arange(len(figures) + 1) == row, _FIGURE_FACTOR, 1.0)
-        varied = scaled(varied, f"platforms.{error.owner}.motion_error.navigation.{figure}", factors)
+        for axis, size in enumerate(navigation.figures[figure]):
+            key = f"platforms.{error.owner}.motion_error.navigation.{figure}.{axis}"
+            varied = with_number(varied, key, factors * size)
     effects = _effects(varied, error.owner, len(figures) + 1)
     sizes = np.asarray(getattr(effects, effect_name))
     if not sizes[0] > 0:

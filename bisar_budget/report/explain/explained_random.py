@@ -580,7 +580,7 @@ def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
             yield from _slow(
                 "Vibration", float(line.frequency), line.left, float(line.free), mission, _PER_SENSITIVITY
             )
-    if flies_a_turn(mission, name):
+    if np.any(flies_a_turn(mission, name)):
         state: PlatformState = getattr(mission.platforms, name).state
         acceleration = float(np.linalg.norm(plain_vector(state.acceleration)))
         values = {"c": SPEED_OF_LIGHT_MPS, "a": acceleration}

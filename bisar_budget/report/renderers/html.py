@@ -2,7 +2,7 @@
 
 import re
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
@@ -45,11 +45,19 @@ def page(document: doc.AnswerDocument) -> str:
         document=document,
         facts=_block(document.facts),
         main=blocks_as_html(document.chapters),
-        inner=lambda chapter: [
-            block for block in chapter.blocks if isinstance(block, doc.Chapter) and block.is_listed
-        ],
+        contents=_contents(document.chapters),
         statuses=STATUS.values(),
     )
+
+
+def _contents(chapters: Sequence[doc.Chapter]) -> list[tuple[doc.Chapter, list[doc.Chapter]]]:
+    """List the chapters for the contents, each with the chapters inside it; empty for a single entry."""
+    listed = [chapter for chapter in chapters if chapter.is_listed]
+    inner = [
+        [block for block in chapter.blocks if isinstance(block, doc.Chapter) and block.is_listed]
+        for chapter in listed
+    ]
+    return list(zip(listed, inner, strict=True)) if len(listed) + sum(map(len, inner)) > 1 else []
 
 
 def _css_string(text: str) -> Markup:

@@ -7,7 +7,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import wrapped_overrides
-from bisar_budget.report.words.sentences import spaced, wrapped
+from bisar_budget.report.words.sentences import spaced, wrapped, wrapped_counts
 
 _MIN_NAME_WIDTH = 12  # of the names of facts
 _STATUS_WIDTH = 8  # characters of a status, the same in every table
@@ -30,6 +30,8 @@ def plain(line: doc.Text) -> str:
 
     Bars and colour keys are left out, because they only repeat numbers.
     """
+    if isinstance(line, str):  # nearly every text, and faster than the patterns below
+        return printable(line).replace(" → ", " -> ")
     match line:
         case tuple():
             return "".join(map(plain, line))
@@ -41,7 +43,6 @@ def plain(line: doc.Text) -> str:
             return ""
         case doc.Name(words) | doc.Code(words):
             return printable(words)
-    return printable(line).replace(" → ", " -> ")
 
 
 def _badge_words(status: str) -> str:
@@ -68,6 +69,17 @@ def _block(block: doc.Block, style: Style) -> Iterator[str]:
     match block:
         case doc.Opening():
             yield from _opening(block, style)
+        case doc.Lead(status, words, breaks):
+            text = f"{STATUS[status].text} {words}"
+            wrap = wrapped(text, "  ") if breaks == " " else wrapped_counts(text) if breaks else [text]
+            first, *more = wrap
+            yield style.coloured(STATUS[status].text, STATUS[status].sgr) + first.removeprefix(STATUS[status].text)
+            yield from more
+        case doc.Overrides(texts):
+            yield from wrapped_overrides(texts)
+        case doc.Close(blocks):
+            for inner in blocks:
+                yield from _block(inner, style)
         case doc.Only(doc.TERMINAL, blocks):
             yield from lines(blocks, style)
         case doc.Paragraph(words, paragraph_style):
@@ -121,27 +133,37 @@ def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
     heads += [[head.unit for head in table.heads]] if any(head.unit for head in table.heads) else []
     cells = [["-" if cell == "–" else cell for cell in map(plain, row)] for row in table.rows]
     sides = "".join(">" if head.style == "number" else "<" for head in table.heads)
-    widths = [max((len(row[column]) for row in (*heads, *cells)), default=0) for column in range(len(sides))]
-    ends_with_sentence = sides.endswith("<") and widths[-1] > _MIN_SENTENCE_WIDTH
+    widths = [
+        max([head.width, *(len(row[column]) for row in (*heads, *cells))]) for column, head in enumerate(table.heads)
+    ]
+    is_long = sides.endswith("<") and widths[-1] > _MIN_SENTENCE_WIDTH
+    ends_with_sentence = is_long or table.heads[-1].is_sentence
     if ends_with_sentence:
         widths[-1] = max(len(head[-1]) for head in heads)
     starts_with_status = any(isinstance(row[0], doc.Badge) for row in table.rows)
-    room = max(style.table_width - sum(widths[1:]) - len(widths) + 1, *(len(head[0]) for head in heads))
-    widths[0] = max(len(row[0]) for row in (*heads, *cells) if len(row[0]) <= room)
     widths[0] = max(widths[0], _STATUS_WIDTH) if starts_with_status else widths[0]
+    named = 1 if starts_with_status else 0  # the column with the names of the rows
+    fixed_width = sum(widths) - widths[named] + len(widths) - 1
+    room = max(style.table_width - fixed_width, *(len(head[named]) for head in heads))
+    widths[named] = max(len(row[named]) for row in (*heads, *cells) if len(row[named]) <= room)
     for head in heads:
         yield spaced(head, widths, sides).rstrip()
-    for line, row in zip(table.rows, cells, strict=True):
-        name = row[0]
-        if len(name) > widths[0]:
-            yield _coloured(line[:1], name, style)
-            row = ["", *row[1:]]
+    below = table.below or [()] * len(cells)
+    for line, row, texts in zip(table.rows, cells, below, strict=True):
+        if len(row[named]) > widths[named]:
+            yield _coloured(
+                line[: named + 1], spaced(row[: named + 1], widths[: named + 1], sides[: named + 1]), style
+            )
+            row = ["" if column <= named else cell for column, cell in enumerate(row)]
         text = spaced(row, widths, sides).rstrip()
         if ends_with_sentence and len(text) > style.table_width:
             yield _coloured(line, spaced([*row[:-1], ""], widths, sides).rstrip(), style)
             yield from wrapped(f"    {row[-1]}", "    ")
         else:
             yield _coloured(line, text, style)
+        indent = " " * (widths[0] + 1) if starts_with_status else "    "
+        for note in texts:
+            yield from wrapped(f"{indent}{note}", indent)
 
 
 def _coloured(row: doc.Line, text: str, style: Style) -> str:

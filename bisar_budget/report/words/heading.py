@@ -72,11 +72,6 @@ def other_overrides(mission: AboutMission) -> list[str]:
     return _overrides(mission, with_changes=False)
 
 
-def overrides_lines(mission: AboutMission) -> list[str]:
-    """Lines with the overrides other than `--set`, for a terminal."""
-    return wrapped_overrides(other_overrides(mission))
-
-
 def wrapped_overrides(overrides: Sequence[str]) -> list[str]:
     """Lines with overrides: all on one line, or each on its own line if they do not fit."""
     line = f"Overrides: {'; '.join(overrides)}"

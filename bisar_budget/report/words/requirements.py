@@ -23,8 +23,6 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_quantity
 
-REQUIREMENT_COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
-
 
 class RequirementLine(NamedTuple):
     """One line of the table of requirements, as strings.

@@ -199,7 +199,7 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 def shown_use(row: Row) -> float | None:
     """Utilization of a row to show; None if the row has no limit, or if it cannot be judged, even if waived."""
-    return None if row.allowable is None or row.is_unjudged or row.status == "not_evaluated" else row.utilization
+    return None if row.allowable is None or row.is_unjudged else row.utilization
 
 
 def phase_unit(mission: MissionFindings) -> str:
