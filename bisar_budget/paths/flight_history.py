@@ -31,7 +31,7 @@ class FlightHistory:
         return np.array([np.interp(times, self.times, component) for component in self.velocities.T])
 
 
-def history_of(times: Floats, places: Floats, start: float, end: float) -> FlightHistory | None:
+def history_of(times: Floats, positions: Floats, start: float, end: float) -> FlightHistory | None:
     """History of the fixes of a log from `start` to `end` [s]; None if the log has too few fixes there.
 
     At each time of the history, a parabola is fitted to the fixes within a second, or to the nearest fixes.
@@ -40,7 +40,7 @@ def history_of(times: Floats, places: Floats, start: float, end: float) -> Fligh
     ----------
     times : (n,)
         Slow times of the fixes in ascending order. [s]
-    places : (n, 3)
+    positions : (n, 3)
         Positions of the fixes, east, north, up. [m]
     start, end : float
         Times of the flight that is needed. [s]
@@ -56,5 +56,5 @@ def history_of(times: Floats, places: Floats, start: float, end: float) -> Fligh
             low = int(np.clip((low + high) // 2 - _FEWEST_FIXES_COUNT // 2, 0, times.size - _FEWEST_FIXES_COUNT))
             high = low + _FEWEST_FIXES_COUNT
         powers = np.vander(times[low:high] - moment, _POLYNOMIAL_ORDER_COUNT, increasing=True)
-        row[:] = np.linalg.lstsq(powers, places[low:high] - places[low], rcond=None)[0][1]
+        row[:] = np.linalg.lstsq(powers, positions[low:high] - positions[low], rcond=None)[0][1]
     return FlightHistory(moments, velocities)
