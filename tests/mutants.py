@@ -184,6 +184,27 @@ MUTANTS = (
         ("tests/simulate/test_flown_errors.py::test_a_wrong_height_of_the_scene_is_flown",),
     ),
     Mutant(
+        "registry: the file states the distribution of the scene's height",
+        "bisar_budget/error_kinds/path_kinds.py",
+        "distribution=BOUND",
+        "distribution=AS_STATED",
+        ("tests/contract/test_kind_objects.py::test_a_size_means_what_its_kind_does_with_it",),
+    ),
+    Mutant(
+        "registry: a size has the key of another one",
+        "bisar_budget/error_kinds/clock_kinds.py",
+        'key="acceleration_sensitivity"',
+        'key="aging"',
+        ("tests/contract/test_kind_objects.py::test_the_mission_reader_accepts_a_size_at_its_path",),
+    ),
+    Mutant(
+        "registry: an error of velocity moves the platform twice as far",
+        "bisar_budget/error_kinds/path_kinds.py",
+        "(np.ones_like(times), times, times**2 / 2)",
+        "(np.ones_like(times), 2 * times, times**2 / 2)",
+        ("tests/theory/test_full_model.py",),
+    ),
+    Mutant(
         "registry: a registered kind is not flown",
         "bisar_budget/simulator/flown_errors.py",
         "Course(times, size * np.array(",

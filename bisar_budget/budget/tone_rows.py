@@ -163,7 +163,7 @@ class SpurRow(FamilyRow):
             row,
             unit="dB",
             path=OSCILLATOR_KIND.path(spur.name, row.subject.axis),
-            equation="first principles" if model == "full" else VIBRATION_KIND.size("sinusoidal").equation,
+            equation="first principles" if model == "full" else OSCILLATOR_KIND.size(row.subject.axis).equation,
             over=over,
             doubt=doubt,
             no_limit=missing,

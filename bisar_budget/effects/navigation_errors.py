@@ -194,8 +194,7 @@ def _moves_by_imu(
         return (Moves(platform_index, ways, courses[..., None] * half ** (figure.growth_power / 2)),)
     swings = swung(about, arm)
     if not figure.spreads:
-        order, times = figure.integrals, seen.exact.times
-        grows, swing = times**order / math.factorial(order), times ** (order - 2)
+        grows, swing = figure.course(seen.exact.times), figure.tilt_course(seen.exact.times)
         return Moves(platform_index, ways, grows[None]), Moves(platform_index, swings, swing[None])
     twice, once = _courses_of_both_walks(len(seen.exact.times))
     return Moves(platform_index, ways, twice[..., None] * half**2.5), Moves(
@@ -270,7 +269,7 @@ def _courses(figure: InertialFigure, count: int) -> Floats:
     """
     if figure.spreads:
         return factor(_walk_of(figure, count).at_nodes).T
-    return nodes(count).places[None] ** figure.integrals / math.factorial(figure.integrals)
+    return figure.course(nodes(count).places)[None]
 
 
 # ---------------------------------------------------------------------- lever arms
@@ -365,9 +364,8 @@ def _with_arm(
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
     if not figure.spreads:
-        order = figure.integrals
-        grows = times**order / math.factorial(order)
-        return seen.of_motion(platform_index, directions[:, :, None] * grows + swings * times ** (order - 2))
+        moved = directions[:, :, None] * figure.course(times) + swings * figure.tilt_course(times)
+        return seen.of_motion(platform_index, moved)
     # The tilt is a random walk. Its double integral is also a position error. Both follow from the same noise.
     along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[platform_index]).lever_arm

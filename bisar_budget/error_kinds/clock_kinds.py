@@ -147,7 +147,9 @@ OSCILLATOR_KIND = ClockKind(
             key="acceleration_sensitivity",
             equation="acceleration sensitivity",
         ),
-        "spur": ErrorSize(dimension=units.TONE, key="spurs", distribution=RELATIVE_LEVEL, equation="tone"),
+        "spur": ErrorSize(
+            dimension=units.TONE, key="spurs", distribution=RELATIVE_LEVEL, equation="Section V, sinusoidal"
+        ),
     },
 )
 SYNCHRONIZATION_KIND = ClockKind(

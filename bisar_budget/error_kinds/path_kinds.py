@@ -1,6 +1,7 @@
-"""Kinds of error of a measured path: position, velocity, acceleration, time tag and height, and registered kinds.
+"""Kinds of error of a measured path: position, velocity, acceleration, time tag and height.
 
-Each of them says by which motion an error of one unit displaces the antenna's phase centre.
+Each of them, and each kind that another package registers, says by which motion an error of one unit displaces the
+antenna's phase centre.
 """
 
 from collections.abc import Mapping

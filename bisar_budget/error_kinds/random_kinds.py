@@ -3,11 +3,16 @@
 A random error has a sigma and no sign. Its courses over the aperture are drawn (`SourceKind.drawn_as`).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bisar_budget import units
 from bisar_budget.error_kinds.kind import BOUND, PEAK_AMPLITUDE, RELATIVE_LEVEL, ErrorSize, SourceKind
+
+if TYPE_CHECKING:
+    from bisar_budget.arrays import Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +46,14 @@ class InertialFigure(ErrorSize):
     def tilts(self) -> bool:
         """Whether the error tilts the axes of the sensor. A tilt rotates the specific force, and the lever arm."""
         return bool(self.tilt_formula)
+
+    def course(self, times: "Floats") -> "Floats":
+        """Position error at slow times due to a constant error that acts as an acceleration of one unit, τⁿ/n!."""
+        return times**self.integrals / math.factorial(self.integrals)
+
+    def tilt_course(self, times: "Floats") -> "Floats":
+        """Tilt at slow times due to a constant error of one unit, for an error that tilts the axes: 1 or τ."""
+        return times ** (self.integrals - 2)
 
     @property
     def growth_power(self) -> int:

@@ -29,7 +29,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
-from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -457,7 +457,7 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
         leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
     added |= _rows_without_element(mission, added)
     has_no_sigmas = all(
-        added.get(f"{owner}.{kind}") for owner in ("transmitter", "receiver") for kind in ("position", "velocity")
+        added.get(f"{owner}.{kind.name}") for owner in ("transmitter", "receiver") for kind in MEASURED_KINDS
     )
     if has_no_sigmas and not clock_sigmas and len(added) == 4:
         return {}
@@ -497,13 +497,13 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
     if error.covariance is not None:
         sigmas = np.array(error.covariance.sigmas)
         covariance = np.outer(sigmas, sigmas) * np.array(error.covariance.correlation)
-    for index, kind in enumerate(("position", "velocity")):
-        block = slice(3 * index, 3 * index + 3)
-        stated_sigmas = getattr(error, kind)
+    for kind in MEASURED_KINDS:
+        block = slice(3 * kind.order, 3 * kind.order + 3)
+        stated_sigmas = getattr(error, kind.name)
         if stated_sigmas is not None:
             covariance[block, block] = np.diag(np.square(stated_sigmas))
-        elif error.covariance is None and (common is None or getattr(common, kind) is None):
-            added[f"{owner}.{kind}"] = "not declared"
+        elif error.covariance is None and (common is None or getattr(common, kind.name) is None):
+            added[f"{owner}.{kind.name}"] = "not declared"
     if error.acceleration is not None:
         turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
         added[f"{owner}.acceleration"] = " ".join(f"{x:.12g}" for x in turn @ error.acceleration) + " m/s^2"
@@ -522,10 +522,11 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
     covariance = _along_scene(covariance, state, error.frame)
     if common is not None:
         shared = np.zeros((6, 6))
-        for index, kind in enumerate(("position", "velocity")):
-            if getattr(common, kind) is not None:
-                block = slice(3 * index, 3 * index + 3)
-                shared[block, block] = np.diag(np.square(getattr(common, kind)))
+        for kind in MEASURED_KINDS:
+            shared_sigmas = getattr(common, kind.name)
+            if shared_sigmas is not None:
+                block = slice(3 * kind.order, 3 * kind.order + 3)
+                shared[block, block] = np.diag(np.square(shared_sigmas))
         covariance = covariance + _along_scene(shared, state, common.frame)
         added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
     turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)

@@ -14,7 +14,9 @@ import numpy as np
 
 from bisar_budget import units
 from bisar_budget.arrays import PerCase
+from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.error_kinds.path_kinds import STATE_KINDS
+from bisar_budget.error_kinds.registry import kinds
 from bisar_budget.faults import Fault, InvalidValueError, Problem, SetValue, fault_words, printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.json_types import JsonObject
@@ -27,7 +29,7 @@ from bisar_budget.mission.changes import (
     parts_of,
 )
 from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
-from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
+from bisar_budget.mission.instruments import POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import MISSION, Mission, Simulation
 from bisar_budget.mission.navigation import OUTAGE_KEYS
@@ -343,7 +345,13 @@ _OMITTED_SECTIONS: Mapping[str, Callable[[], object]] = {
 }
 _STATE_NAMES = tuple(kind.name for kind in STATE_KINDS)
 _FIELDS_BY_KEY = {**POWERS, **OUTAGE_KEYS}  # of keys that cannot be names of fields
-_TRIPLES = (*_STATE_NAMES, *IMU_KINDS, "uncertainty")
+_TRIPLES = frozenset(
+    kind.path("", axis)[-1]
+    for kind in kinds()
+    if isinstance(kind, SourceKind)
+    for axis, size in kind.sizes.items()
+    if size.has_axes
+)
 # Curves of an oscillator, with the dimension of their abscissas, which name the points.
 _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,

@@ -411,6 +411,7 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
         sections.append((f"{key}.random", None, (), len(error.random)))
         sections.append((key, error, (TIME_TAG_KIND.name,), 0))
         sections.append((f"{key}.lever_arm", error.lever_arm, ("uncertainty",), 0))
+        yield from (f"{key}.registered.{kind}" for kind in error.registered)
     common, air = mission.common_motion_error, mission.propagation
     sections.append(("common_motion_error", common, (*MOTION, TIME_TAG_KIND.name), 0))
     sections.append(("common_motion_error.random", None, (), 0 if common is None else len(common.random)))

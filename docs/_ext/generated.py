@@ -23,6 +23,8 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from bisar_budget.catalogue import SYMBOLS
+from bisar_budget.error_kinds.kind import AS_STATED, BOUND, NORMAL, PEAK_AMPLITUDE, RELATIVE_LEVEL, SourceKind
+from bisar_budget.error_kinds.registry import kinds
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers
 from bisar_budget.mission.model import MISSION
@@ -449,6 +451,34 @@ def note_codes(_: Generated) -> str:
     )
 
 
+_SIZE_WORDS = {
+    NORMAL: "one sigma",
+    BOUND: "largest magnitude",
+    AS_STATED: "as `distribution` states",
+    PEAK_AMPLITUDE: "amplitude",
+    RELATIVE_LEVEL: "level",
+}
+
+
+def error_kinds(_: Generated) -> str:
+    """Every kind of error source, with the keys, the units and the meaning of its sizes."""
+    rows = []
+    for kind in kinds():
+        if not isinstance(kind, SourceKind) or kind.is_registered:
+            continue
+        description = kind.description
+        for axis, size in kind.sizes.items():
+            forms = [form for form in (size.section_form or kind.key_form, kind.common_key_form) if form]
+            keys = [
+                f"{form}.{size.key}".rstrip(".").format(owner="NAME", kind=kind.name, axis=axis, index="N")
+                for form in forms
+            ]
+            keys_text = " or ".join(f"`{key}`" for key in keys)
+            rows.append((f"`{kind.name}`", keys_text, size.unit, _SIZE_WORDS[size.distribution], description))
+            description = ""
+    return table(("kind", "key", "unit", "size", "is"), rows)
+
+
 def rooms(_: Generated) -> str:
     """The rooms of the package from the lowest floor up, with the first line of what each says of itself."""
     structure = ast.parse((ROOT / "tests" / "house" / "test_structure.py").read_text(encoding="utf-8"))
@@ -479,6 +509,7 @@ DIRECTIVES = {
     "missions": missions,
     "derived": derived,
     "symbols": symbols,
+    "error-kinds": error_kinds,
     "rooms": rooms,
 }
 

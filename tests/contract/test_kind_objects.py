@@ -9,6 +9,7 @@ import bisar_budget as bb
 from bisar_budget import units
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.sources import distribution_of
 from bisar_budget.error_kinds.clock_kinds import ClockKind, ClockSize
 from bisar_budget.error_kinds.kind import AS_STATED, BOUND, NORMAL, PEAK_AMPLITUDE, RELATIVE_LEVEL, SourceKind
 from bisar_budget.error_kinds.path_kinds import PathKind, StateKind
@@ -50,6 +51,43 @@ def test_a_kind_says_how_its_errors_come_about(kind: SourceKind) -> None:
         assert all(isinstance(size, ClockSize) for size in kind.sizes.values())
     elif not kind.is_random:
         assert kind.moves == "image"
+
+
+@pytest.mark.parametrize(("kind", "axis"), SIZES, ids=lambda value: getattr(value, "name", value))
+def test_a_size_means_what_its_kind_does_with_it(kind: SourceKind, axis: str) -> None:
+    """The coverage factor multiplies no bound; the file states the distribution of an error of a measured path."""
+    size = kind.size(axis)
+    assert (size.distribution == BOUND) == (not kind.is_covered)
+    assert (size.distribution == AS_STATED) == (isinstance(kind, PathKind) and kind.is_covered)
+    assert (size.distribution == RELATIVE_LEVEL) == (size.dimension in units.LEVELS and kind.moves != "image")
+    assert (size.distribution == PEAK_AMPLITUDE) == (kind.is_vibration and axis == "sinusoidal")
+
+
+@pytest.mark.parametrize("stated", ["normal", "uniform", "bound"])
+def test_the_file_states_the_distribution_of_an_error_of_a_path(stated: str) -> None:
+    mission = moving_mission("rigling_moses_section_v", "scene", "platforms.receiver.motion_error").replace(
+        {"platforms.receiver.motion_error.distribution": stated}
+    )
+    for source in Analysis(mission).sources:
+        if source.declared is not None and source.owner == "receiver":
+            assert distribution_of(mission, source) == stated
+        elif source.declared is not None:
+            assert distribution_of(mission, source) == (NORMAL if source.kind.moves == "clock" else BOUND)
+
+
+@pytest.mark.parametrize(("kind", "axis"), SIZES, ids=lambda value: getattr(value, "name", value))
+def test_the_row_of_a_size_has_its_equation_and_its_unit(kind: SourceKind, axis: str) -> None:
+    """By the published model; tones of an oscillator and spectra of a vibration have rules of their own."""
+    for key, _ in keys_of(kind, axis):
+        document = mission_with_key(key)
+        document["allocation"] = {"model": "published", "combine": "each"}
+        (row,) = [row for row in bb.check(loaded(document)).findings.rows if row.id == ERROR_KEYS[key].row]
+        size = kind.size(axis)
+        if row.subject.kind != kind.name:  # an attitude error is also that of another kind
+            assert size.section_form
+            continue
+        assert (row.equation or "").startswith(size.equation), row.equation
+        assert row.unit == size.unit.replace("dBc", "dB")  # of a spur the row has the level of the echo
 
 
 def keys_of(kind: SourceKind, axis: str) -> Iterator[tuple[str, str]]:

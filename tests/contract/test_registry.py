@@ -199,6 +199,19 @@ def test_large_draws_of_a_registered_kind_are_those_of_its_motion() -> None:
     )
 
 
+def test_sensitivity_doubles_a_registered_kind() -> None:
+    """It was missing in the list of errors that are doubled to compare the shares of the platforms."""
+
+    def north(path: object, times: np.ndarray) -> np.ndarray:
+        return np.stack([0 * times, times, 0 * times])
+
+    bb.register(bb.MotionKind(name="drift_north", dimension=units.SPEED, description="Drift.", motion=north))
+    mission = bb.load(str(ROOT / "specs/missions/rigling_moses_section_v.yaml"))
+    key = "platforms.receiver.motion_error.registered.drift_north"
+    balanced = mission.replace({key: "1 mm/s", "allocation.split": "balanced"})
+    assert key in [relaxed.key for relaxed in bb.sensitivity(balanced).found.relaxed]
+
+
 def refused(name: str, motion: Callable[..., np.ndarray]) -> pytest.ExceptionInfo[ValueError]:
     bb.register(bb.MotionKind(name=name, dimension=units.LENGTH, description="Error.", motion=motion))
     mission = bb.load(str(ROOT / "specs/missions/tandem_x.yaml"))
