@@ -4,7 +4,7 @@
 
     result = bb.check(bb.load("mission.yaml"))
 
-Numbers are in SI units and radians. Each name of the package is imported when it is first used, so `import
+Numbers are in SI units and radians. The names of the package are imported when they are first used, so `import
 bisar_budget` alone imports nothing else.
 """
 

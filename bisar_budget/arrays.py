@@ -1,4 +1,4 @@
-"""Type aliases for arrays, and for values that are a number (one case) or an array (many cases)."""
+"""Type aliases for arrays, and for values that are plain numbers (one case) or arrays (many cases)."""
 
 from typing import Any
 

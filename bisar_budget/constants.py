@@ -1,4 +1,4 @@
-"""Physical constants and fixed tolerances with their units and sources, and values of some command-line options."""
+"""Physical constants and fixed tolerances, with their units and sources, and accepted values of some options."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0  # exact (SI, CGPM 1983)
 STANDARD_GRAVITY_MPS2 = 9.80665  # exact (CGPM 1901); data sheets state accelerometer bias in g

@@ -17,9 +17,10 @@ def upwards(path: KeyPath) -> Iterator[KeyPath]:
 
 
 class Region(NamedTuple):
-    """Region of a value in a file, counted from 1 in characters; `end_column` is the column after its last character.
+    """Region of a value in a file. Lines, and columns of characters, are counted from 1.
 
-    The ends are None for a mapping or a list, because a message points only at its start.
+    `end_column` is the column after the last character. `end_line` and `end_column` are None for a mapping or a list,
+    because a message points only at its start.
     """
 
     line: int
@@ -42,10 +43,8 @@ class Place(int):
     def of(cls, event: ParserEvent) -> "Place":
         """Place of an event of the YAML parser.
 
-        Each event has a single place object, because many rows refer to the same key.
-
-        The place stores four numbers and the text, not the marks of the parser, which would take half the memory of a
-        mission.
+        Many rows refer to the same key, so all calls with the same event return the same object. The object stores
+        four numbers and the text instead of the marks of the parser, which would take half the memory of a mission.
         """
         fields: dict[str, ParserEvent] = event.__dict__
         position: Place | None = fields.get("place")
@@ -97,9 +96,9 @@ def closed(text: str) -> str:
 
 
 class SetValue(NamedTuple):
-    """Value from an option that replaces the value of the mission file: `--set radar.bandwidth=150MHz`.
+    """Value from an option that replaces a value of the mission file, such as `--set radar.bandwidth=150MHz`.
 
-    `text` is the value in the form in which a mission file would state it.
+    `text` is the value as it would be written in a mission file.
     """
 
     key: str
@@ -107,7 +106,7 @@ class SetValue(NamedTuple):
 
     @property
     def option(self) -> str:
-        """Option that gave the value, as the first words of a message about it."""
+        """Text of the option that gave the value; messages about the value begin with it."""
         return f"--set {printable(self.key)}"
 
 
@@ -125,23 +124,20 @@ class SetNumber(SetValue):
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
-        """Replace the value of `key` by a number in the SI unit `unit`, which may be empty."""
+        """Create the replacement of the value at `key` by a number in the SI unit `unit`, which may be empty."""
         set_number = cls(key, f"{number!r} {unit}".rstrip())
         set_number.value = set_number.text if unit in _BY_UNIT else number
         return set_number
 
 
 class Changed:
-    """Substitute for an event of the YAML parser, for a value from an option.
-
-    Such a value has no line in a file.
-    """
+    """Substitute for an event of the YAML parser, used for a value from an option, which has no line in a file."""
 
     start_mark = None
 
 
 def changes_words(changes: Sequence[SetValue]) -> str:
-    """Format the options that changed a mission as on the command line.
+    """Format the options that changed a mission as they are written on the command line.
 
     The result is an empty string if no option changed the mission.
     """
@@ -153,7 +149,7 @@ def changes_words(changes: Sequence[SetValue]) -> str:
 
 
 class Problem(NamedTuple):
-    """Problem with a value, reported by code that does not know the file and the key of the value.
+    """Problem with a value, reported by code that knows neither the file nor the key of the value.
 
     `at` is the path of the wrong value relative to the checked value. `names_value` is true if the text already
     contains the value. `is_of_key` is true if the key is wrong, whatever its value.
@@ -168,7 +164,7 @@ class Problem(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Text of the full problem: the fault, the accepted values, and the hint."""
+        """Text of the full problem, with the accepted values and the hint."""
         return fault_words(self.problem, "", self.accepted, self.hint)
 
 
@@ -181,10 +177,11 @@ class InvalidValueError(ValueError):
 
 
 class Fault(NamedTuple):
-    """One fault of a mission file. Line and column are counted from 1; None for a fault of the whole file.
+    """One fault of a mission file.
 
-    `option` is the option that gave the value; it is empty for a value in the file. `file` is the file of the
-    mission, known for faults of a `MissionError`.
+    `line` and `column` are counted from 1; they are None for a fault of the whole file. `option` is the option that
+    gave the value; it is empty for a value in the file. `file` is the name of the mission file; it is set for the
+    faults of a `MissionError`.
     """
 
     line: int | None
@@ -199,7 +196,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """Description of the problem without its place, the given value and the accepted values."""
+        """Description of the problem without its location, the given value and the accepted values."""
         return self.problem
 
     def __str__(self) -> str:
@@ -219,18 +216,18 @@ class ClusterError(Exception):
 
 
 class WorkerLostError(Exception):
-    """A worker process ended before its work did."""
+    """A worker process ended before it finished its work."""
 
 
 class MotionKindError(ValueError):
-    """A registered kind of error gives a motion that cannot be used; the message names the kind and its package."""
+    """The motion of a registered kind of error cannot be used; the message names the kind and its package."""
 
 
 class MissionError(Exception):
-    """A mission file cannot be used. The error has all faults of the file, in file order.
+    """A mission file cannot be used. The exception lists all faults of the file, in file order.
 
-    `data` is the content of the file in bytes. It is None without a file, or if the file is longer than the part that
-    was read.
+    `data` is the content of the file in bytes. It is None if there is no file, or if the file was not read to its
+    end.
     """
 
     def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:
@@ -240,11 +237,11 @@ class MissionError(Exception):
         self.data: bytes | None = None
 
     def __str__(self) -> str:
-        """All faults, each on a line of its own."""
+        """Text of all faults of the file, with each fault on a line of its own."""
         return "\n".join(self.lines())
 
     def lines(self) -> list[str]:
-        """Write one `file:line:column: fault` per fault."""
+        """List the faults of the file as strings `file:line:column: fault`."""
         return [
             ":".join(str(part) for part in (printable(self.file), fault.line, fault.column) if part is not None)
             + f": {fault}"

@@ -1,8 +1,8 @@
-"""Bistatic geometry at the aperture midpoint: look vectors, angles, ground gradients, frames.
+"""Bistatic geometry at the aperture midpoint: look vectors, angles, gradients on the ground, and frames.
 
-Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. SI units, radians.
-Vectors are tuples. Their components are numbers for one case, or arrays (cases,) for many. Functions of plain numbers
-return plain floats, which takes a tenth of the time of NumPy scalars.
+The scene centre is the origin, and the ground is the plane z = 0; x is east, y north and z up. SI units, radians.
+Vectors are tuples of components, which are numbers for one case or arrays (cases,) for many. Functions of plain
+numbers return plain floats, which are ten times as fast as NumPy scalars.
 """
 
 import math
@@ -41,9 +41,9 @@ FRAME_AXES = {
 class UndefinedFrameError(ValueError):
     """The requested frame does not exist for a platform.
 
-    A platform that does not move has no `track` frame. A platform directly above the scene centre has no cross
-    direction. Without the latitude and longitude of the scene, the Earth's centre is unknown, and no platform has the
-    frame `ric`.
+    The frame `track` does not exist for a platform at rest. A platform directly above the scene centre has no cross
+    direction. The frame `ric` does not exist if the latitude and longitude of the scene are unknown, because the
+    position of the Earth's centre is then unknown as well.
     """
 
 
@@ -52,7 +52,7 @@ _ARRAY = np.ndarray
 
 # With the functions of NumPy alone, a state from angles takes three times as long, and last digits of results change.
 def _either(of_numbers: Callable[..., PerCase], of_arrays: Callable[..., PerCase]) -> Callable[..., PerCase]:
-    """Combine a function of numbers and a function of arrays into one function that accepts both."""
+    """Combine a function for numbers and a function for arrays into one function that accepts both."""
 
     def function(*values: PerCase) -> PerCase:
         return of_arrays(*values) if _ARRAY in map(type, values) else of_numbers(*values)
@@ -118,21 +118,21 @@ def without_rounding(a: Vector) -> Vector: ...
 @overload
 def without_rounding(a: Vectors) -> Vectors: ...
 def without_rounding(a: Vectors) -> Vectors:
-    """Set to zero the components of a vector that are rounding errors relative to its length: cos 90° is 6e-17."""
+    """Set components to zero that are only rounding errors relative to the length, such as 6e-17 for cos 90°."""
     floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
 def plain_vector(a: Vectors) -> Vector:
-    """Convert the vector of one case to plain numbers."""
+    """Convert a vector for a single case to a tuple of three floats."""
     x, y, z = a
     return (float(x), float(y), float(z))
 
 
 def _of_cases(values: Floats, asked: PerCase) -> PerCase:
-    """Return `values` (cases,), or a float for a single case.
+    """Return `values` (cases,), or a float if there is a single case and the argument `asked` is a number.
 
-    A float is returned only if the argument `asked` was a number.
+    `asked` is the argument for which the values were computed.
     """
     return values if np.ndim(asked) or values.size > 1 else values.item()
 
@@ -142,7 +142,7 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
 
 
 def _number_of_cases(number: PerCase, cases: Indices) -> PerCase:
-    """Select the numbers of some cases; a number that all cases share is unchanged."""
+    """Select elements of an array by case indices; a number that is the same for all cases is returned unchanged."""
     return number[cases] if isinstance(number, np.ndarray) and number.size > 1 else number
 
 
@@ -152,21 +152,21 @@ def _vector_of_cases(vector: Vectors, cases: Indices) -> Vectors:
 
 
 class CurvedPath(Protocol):
-    """Path that is not a single polynomial of slow time."""
+    """A platform path that is not a single polynomial of slow time."""
 
     @property
     def count(self) -> int:
-        """Number of pieces."""
+        """Number of pieces of the path."""
 
     def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
-        """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+        """Position [m] and velocity [m/s] at slow times from the midpoint."""
 
     def of(self, cases: Indices) -> "CurvedPath":
-        """Select the paths of some cases, by their indices."""
+        """Select the paths of some cases by their indices."""
 
 
 class Fall(Protocol):
-    """Dynamics of the errors of a platform in free fall; implemented by `paths.free_fall.FreeFall`."""
+    """Propagation of the state errors of a platform in free fall; implemented by `paths.free_fall.FreeFall`."""
 
     @property
     def share(self) -> PerCase:
@@ -175,12 +175,13 @@ class Fall(Protocol):
     def motions(self, path: "PlatformState", half: NDArray[np.float64], places: NDArray[np.float64]) -> Any:
         """Motion over the aperture due to unit errors of the state at mid-aperture, (3, 3, 3, nodes, cases). [m]
 
-        The first three indices are the error (position, velocity, acceleration), its axis, and the component. `half`
-        is half the aperture time [s], and `places` are the slow times of the nodes in units of `half`.
+        The first index is the kind of error (position, velocity, acceleration), the second its axis, and the third
+        the component of the motion. `half` is half the aperture time [s], and `places` are the slow times of the
+        nodes in units of `half`.
         """
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Velocity error, in the scene axes, due to a position error that is constant in inertial axes. [m/s]
+        """Velocity error in the axes of the scene due to a position error that is constant in inertial space. [m/s]
 
         `position` is the position error, east, north and up. [m]
         """
@@ -197,16 +198,16 @@ class Fall(Protocol):
         """Angular rate vector of the scene axes with respect to inertial space. [rad/s]"""
 
     def of(self, cases: Any) -> "Fall":
-        """Select the dynamics of some cases, by their indices."""
+        """Select the dynamics for some cases by their indices."""
 
 
 @dataclass(frozen=True)
 class Pieces:
     """Piecewise polynomial path; each polynomial applies to an interval (piece) of slow time.
 
-    The first and the last polynomial continue beyond the ends. The time of each piece is relative to the middle of
-    the piece, because a polynomial about the midpoint of a long aperture would lose digits in powers of hundreds of
-    seconds. Numbers may be arrays (cases,).
+    The first and the last polynomial also apply beyond the ends of the path. Each polynomial counts time from the
+    middle of its piece. Times from the midpoint of a long aperture can be hundreds of seconds, and high powers of
+    such times would lose digits. Numbers may be arrays (cases,).
 
     Attributes
     ----------
@@ -224,7 +225,7 @@ class Pieces:
 
     @property
     def count(self) -> int:
-        """Number of pieces."""
+        """Number of pieces of the path."""
         return len(self.middles)
 
     @cached_property
@@ -240,7 +241,7 @@ class Pieces:
         return starts, middles, powers if every.ndim == 1 else np.moveaxis(powers, -1, 1)
 
     def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
-        """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+        """Position [m] and velocity [m/s] at slow times from the midpoint."""
         starts, middles, powers = self._arrays
         times = np.asarray(tau, dtype=float)
         if middles.ndim == 1:
@@ -260,7 +261,7 @@ class Pieces:
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
     def of(self, cases: Indices) -> "Pieces":
-        """Select the paths of some cases, by their indices; numbers that all cases share are unchanged."""
+        """Select the paths of some cases by their indices; numbers that are the same for all cases are unchanged."""
         starts, middles = (
             tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
         )
@@ -273,7 +274,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class _Apart:
-    """Difference of two paths, at least one of which is in pieces."""
+    """Difference of two paths, at least one of which is piecewise."""
 
     path: "PlatformState"
     other: "PlatformState"
@@ -294,10 +295,11 @@ class _Apart:
 class PlatformState:
     """Path of one platform over the aperture as a function of slow time, for one case or many.
 
-    Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and the coefficients of τ³, τ⁴, … in `bends`
-    [m/s³], [m/s⁴], … form a polynomial. Without a `curve` the polynomial is the full path; with a `curve` it is the
-    path near the midpoint. `radial` are the axes of the platform's `ric` frame if the Earth's centre is known. `fall`
-    is the dynamics of the errors of a platform in free fall; None for any other platform.
+    The position [m], the velocity [m/s] and the acceleration [m/s²] at the midpoint, and the coefficients `bends` of
+    τ³ [m/s³], τ⁴ [m/s⁴], … define a polynomial of slow time τ. Without a `curve` the polynomial is the full path;
+    with a `curve` it is the path near the midpoint. `radial` contains the axes of the platform's `ric` frame if the
+    position of the Earth's centre is known. `fall` describes how errors of a platform in free fall propagate; it is
+    None for any other platform.
     """
 
     position: Vectors
@@ -310,12 +312,12 @@ class PlatformState:
 
     @property
     def is_still(self) -> PerCaseFlag:
-        """Whether the platform does not move. A path in pieces counts as moving."""
+        """Whether the platform is at rest. A platform with a piecewise path counts as moving."""
         return self.curve is None and self.travelled(1.0) < STILL_SPEED_MPS
 
     @property
     def is_straight(self) -> bool:
-        """Whether the velocity is constant, for a platform of one case."""
+        """Whether the velocity is constant; only for a platform with a single case."""
         return self.acceleration == STRAIGHT and self.is_quadratic
 
     @property
@@ -350,7 +352,7 @@ class PlatformState:
     @overload
     def at(self, tau: PerCase) -> tuple[Vectors, Vectors]: ...
     def at(self, tau: PerCase) -> tuple[Vectors, Vectors]:
-        """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+        """Position [m] and velocity [m/s] at slow times from the midpoint."""
         if self.curve is not None:
             return self.curve.at(tau)
         v, a = self.velocity, self.acceleration
@@ -365,7 +367,7 @@ class PlatformState:
         return _minus(self.place(tau + delay_s), self.place(tau))
 
     def of(self, cases: Indices) -> "PlatformState":
-        """Select the paths of some cases, by their indices; numbers that all cases share are unchanged."""
+        """Select the paths of some cases by their indices; numbers that are the same for all cases are unchanged."""
         return PlatformState(
             position=_vector_of_cases(self.position, cases),
             velocity=_vector_of_cases(self.velocity, cases),
@@ -408,7 +410,7 @@ class PlatformState:
         return way + sum((norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def sinks(self, duration_s: PerCase) -> PerCase:
-        """Upper bound of how far the platform descends below its height at the midpoint. [m]
+        """Upper bound of the descent of the platform below its height at the midpoint. [m]
 
         The bound applies to slow times from `-duration_s` to `duration_s`.
         """
@@ -418,12 +420,15 @@ class PlatformState:
         return way + sum((absolute(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3)), 0.0)
 
     def _looks(self, duration_s: PerCase) -> VectorArrays:
-        """Positions at evenly spaced times from `-duration_s` to `duration_s`, (samples, cases) per component. [m]"""
+        """Positions at evenly spaced times from `-duration_s` to `duration_s`. [m]
+
+        Each of the three components has the shape (samples, cases).
+        """
         count = _MIN_LOOK_COUNT if self.curve is None else max(_MIN_LOOK_COUNT, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
     def less(self, other: "PlatformState") -> "PlatformState":
-        """Path relative to a second path: the difference of the positions at each time. It has no `ric` frame."""
+        """Path relative to another platform: the difference of both positions at each time. It has no `ric` frame."""
         return PlatformState(
             position=_minus(self.position, other.position),
             velocity=_minus(self.velocity, other.velocity),
@@ -434,19 +439,19 @@ class PlatformState:
 
     @property
     def azimuth(self) -> PerCase:
-        """Azimuth φ of (6), counter-clockwise from east. [rad]"""
+        """Azimuth φ of equation (6) in Rigling & Moses, counter-clockwise from east. [rad]"""
         return _arctan2(self.position[1], self.position[0])
 
     @property
     def elevation(self) -> PerCase:
-        """Elevation θ of (6), above the ground plane as seen from the scene centre. [rad]"""
+        """Elevation θ of equation (6) in Rigling & Moses: angle above the ground plane at the scene centre. [rad]"""
         return _arctan2(self.position[2], _hypot(self.position[0], self.position[1]))
 
     @property
     def squint(self) -> float | None:
-        """Squint of one case: angle of the line of sight from broadside, positive forward. [rad]
+        """Squint: angle of the line of sight from broadside, positive forward; only for a single case. [rad]
 
-        None for a still platform.
+        None for a platform at rest.
         """
         speed = float(norm(self.velocity))
         if speed == 0:
@@ -455,10 +460,10 @@ class PlatformState:
         return math.asin(max(-1.0, min(1.0, sine))) if abs(sine) > VECTOR_ROUNDING_FRACTION else 0.0
 
     def has_frame(self, name: str, margin: float = 1.0) -> PerCaseFlag:
-        """Whether the platform has the frame `name`.
+        """Whether the frame `name` exists for the platform.
 
-        `margin` multiplies the threshold below which the horizontal part of the first axis counts as a rounding
-        error.
+        A frame does not exist if the horizontal part of its first axis is so small that it counts as a rounding
+        error. `margin` is a factor on the smallest length that this part may have.
         """
         if name in ("scene", "ric"):
             return name == "scene" or self.radial is not None
@@ -472,21 +477,21 @@ class PlatformState:
         return self.velocity if name == "track" else self.position
 
     def frame(self, name: str) -> Axes:
-        """Axes of a frame as right-handed unit vectors in the axes of the scene, in the order of `FRAME_AXES`.
+        """Unit vectors of a right-handed frame, given in the axes of the scene, in the order of `FRAME_AXES`.
 
-        In `track`, the first axis is along the velocity, cross is horizontal and to the left, and up completes the
-        frame (vertical in level flight). In `look`, the first axis is the line of sight from the scene centre to the
-        platform, cross is horizontal, and up completes the frame. In `ric`, the first axis points away from the
-        Earth's centre. The plane of the orbit contains the inertial velocity; in-track lies in this plane, and
-        cross-track is its normal.
+        In `track`, the first axis is along the velocity, cross is horizontal and to the left, and up, which is
+        vertical in level flight, completes the frame. In `look`, the first axis is the line of sight from the scene
+        centre to the platform, cross is horizontal, and up completes the frame. In `ric`, the first axis points away
+        from the Earth's centre. The plane of the orbit contains the inertial velocity; in-track lies in this plane,
+        and cross-track is its normal.
 
-        If there are many cases, the axes are NaN in cases without the frame.
+        If there are many cases, the axes are NaN for the cases in which the frame does not exist.
 
         Raises
         ------
         UndefinedFrameError
-            The frame is `track` and the platform is still, the first axis is vertical, or the Earth's centre is
-            unknown.
+            The frame does not exist: the platform is at rest (`track`), the first axis is vertical (`track` and
+            `look`), or the position of the Earth's centre is unknown (`ric`).
         """
         has_it = self.has_frame(name)
         if not isinstance(has_it, np.ndarray) and not has_it:
@@ -521,7 +526,7 @@ def state_from_angles(
 ) -> PlatformState:
     """Path of a platform from range, angles and speed at the midpoint.
 
-    `speed` is the speed over ground, and `climb` the vertical part of the velocity.
+    `speed` is the speed over ground, and `climb` is the vertical component of the velocity.
     """
     position = (
         slant_range * _cos(azimuth) * _cos(elevation),
@@ -539,7 +544,7 @@ def state_from_angles(
 
 @dataclass(frozen=True, kw_only=True)
 class BistaticGeometry:
-    """Geometry of both platforms, with the gradients of range and Doppler on the ground, for one case or many."""
+    """Paths of both platforms, and the gradients of range and Doppler on the ground; for one case or many."""
 
     transmitter: PlatformState
     receiver: PlatformState
@@ -561,17 +566,17 @@ class BistaticGeometry:
         return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT_MPS
 
     def at(self, tau: PerCase) -> "BistaticGeometry":
-        """Geometry at slow times [s], with straight paths through the positions at these times."""
+        """Geometry at slow times [s]; the platforms have straight paths through their positions at these times."""
         transmitter, receiver = (
             PlatformState(position=p, velocity=v) for p, v in (path.at(tau) for path in self.both)
         )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
-        """Decrease of the range at mid-aperture per metre of motion of each platform, transmitter first. [-]
+        """Decrease of the bistatic range at mid-aperture per metre of motion of each platform, transmitter first. [-]
 
-        These are the lines of sight u_t and u_r. If the direct path is the clock, they are u_t − b and u_r + b, with
-        b the unit vector from receiver to transmitter.
+        These are the lines of sight u_t and u_r. If the receiver uses the direct path as its clock, the result is
+        u_t − b and u_r + b, where b is the unit vector from receiver to transmitter.
         """
         t, r = self.transmitter.look, self.receiver.look
         if not has_direct_path:
@@ -596,7 +601,7 @@ class BistaticGeometry:
 
     @property
     def look_azimuth(self) -> PerCase:
-        """Bistatic look direction φ_b of (11), computed with atan2. [rad]"""
+        """Bistatic look direction φ_b of equation (11) in Rigling & Moses, computed with atan2. [rad]"""
         return _arctan2(self.range_gradient[1], self.range_gradient[0])
 
     @property
@@ -615,11 +620,14 @@ class BistaticGeometry:
         return speed_of_light / (bandwidth_hz * _hypot(*self.range_gradient))
 
     def cross_range_resolution(self, wavelength_m: PerCase, aperture_time_s: PerCase) -> PerCase:
-        """Cross-range resolution on the ground: λ/(T|ṡ⊥|), peak to first null along a line of constant range. [m]"""
+        """Cross-range resolution on the ground: λ/(T|ṡ⊥|). [m]
+
+        It is the distance from peak to first null along a line of constant range.
+        """
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
 
 
 def angle_between_lines(a: tuple[PerCase, PerCase], b: tuple[PerCase, PerCase]) -> PerCase:
-    """Angle between two lines in the plane, without sign, 0 to π/2; 0 if the direction of a line is zero. [rad]"""
+    """Angle between two lines in the plane, from 0 to π/2; 0 if one of the direction vectors is zero. [rad]"""
     return _arctan2(absolute(a[0] * b[1] - a[1] * b[0]), absolute(a[0] * b[0] + a[1] * b[1]))

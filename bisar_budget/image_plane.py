@@ -1,15 +1,14 @@
 """The matrix H, which measures how well the aperture and the band distinguish ground points.
 
-The ranges of two ground points at a distance x from each other differ by g(τ)·x. Here g is the sum of both lines of
-sight, projected on the ground. The variance of the phase difference over aperture and band is k²·xᵀHx, with k =
-2πf₀/c and
+If x is the vector between two ground points, their ranges differ by g(τ)·x. Here g is the sum of both lines of sight,
+projected on the ground. The variance of the phase difference over aperture and band is k²·xᵀHx, with k = 2πf₀/c and
 
     H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
 
-for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. If H is singular, points along a
+for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the aperture. If H is singular, the points of a
 line cannot be distinguished, and the collection has no image plane. H is half the second derivative of V, the
-variance that the image point minimises (see `ranges.exact_ranges`). The matrix is derived here; it is not in the
-paper.
+variance that the image point minimises (see `ranges.exact_ranges`). The matrix was derived for this program; it is
+not in the paper by Rigling & Moses.
 """
 
 import math
@@ -48,7 +47,7 @@ class Band(Protocol):
 
     @property
     def bandwidth(self) -> PerCase:
-        """Width of the evenly filled band. [Hz]"""
+        """Width of the band, which is evenly filled. [Hz]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +59,9 @@ class Sampling:
     places : (samples,)
         Slow times from −1 to 1, in units of half the aperture time.
     fit : (4, samples)
-        Weights whose products with a history give its mean (P₀ part), and its P₁, quadratic and cubic part at the
-        aperture edge. The quadratic part is 3/2 times the P₂ coefficient, the cubic part 5/2 times that of P₃.
+        Weights whose products with a history give its mean (the P₀ part), and the values of its P₁ part, quadratic
+        part and cubic part at the aperture edge. The quadratic part is 3/2 times the coefficient of P₂, and the cubic
+        part is 5/2 times the coefficient of P₃.
     """
 
     places: Floats
@@ -74,7 +74,7 @@ class Sampling:
 
     @cached_property
     def polynomials(self) -> Floats:
-        """Legendre polynomials P₀ to P₃ at the samples, each divided by its leading coefficient, (samples, 4)."""
+        """Legendre polynomials P₀ to P₃ at the samples (samples, 4), each divided by its leading coefficient."""
         return np.asarray(np.polynomial.legendre.legvander(self.places, 3) / LEGENDRE_LEADING)
 
     @cached_property
@@ -84,14 +84,14 @@ class Sampling:
 
     @cached_property
     def to_finest(self) -> Floats:
-        """Weights that interpolate a smooth history from the samples to the finest nodes, (FINEST_NODES, samples).
+        """Weights (FINEST_NODES, samples) that interpolate a smooth history from the samples to the finest nodes.
 
-        The finest nodes are those of `nodes(FINEST_NODES)`.
+        The finest nodes are the slow times of `nodes(FINEST_NODES)`.
         """
         return self._weights_at(nodes(FINEST_NODES).places)
 
     def _weights_at(self, slow_times: Floats) -> Floats:
-        """Weights (times, samples) that interpolate a smooth history from the samples to slow times over −1 … 1."""
+        """Weights (times, samples) that interpolate a smooth history from the samples to slow times from −1 to 1."""
         degree = min(self.places.size, SIGHT_POLYNOMIAL_COUNT) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
         return np.asarray(np.polynomial.legendre.legvander(slow_times, degree) @ np.linalg.pinv(polynomials))
@@ -104,7 +104,7 @@ LEGENDRE_LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the 
 def nodes(count: int) -> Sampling:
     """Sampling at the nodes of Gauss-Legendre quadrature.
 
-    The weights give the coefficient of order n of a history ρ as (2n + 1)/2 ∫ρPₙ over −1 … 1.
+    The weights `fit` compute the Legendre coefficient of order n of a history ρ as (2n + 1)/2 ∫ρPₙ over −1 … 1.
     """
     slow_times, weights = np.polynomial.legendre.leggauss(count)
     orders = np.polynomial.legendre.legvander(slow_times, 3)
@@ -114,9 +114,9 @@ def nodes(count: int) -> Sampling:
 def nodes_for(
     geometry: BistaticGeometry, aperture_time_s: PerCase, *, has_direct_path: bool = False
 ) -> int | Indices:
-    """Number of quadrature nodes that each case needs, for the lines of sight of both platforms.
+    """Number of quadrature nodes over the aperture that each case needs for the lines of sight of both platforms.
 
-    If the direct path is the clock, the number is also sufficient for the direct path.
+    If the receiver uses the direct path as its clock, the number is also sufficient for the direct path.
     """
     half = aperture_time_s / 2
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
@@ -131,18 +131,20 @@ def nodes_for(
 
 
 def band_variance(radar: Band) -> PerCase:
-    """Variance of the frequencies of an evenly filled band, divided by the square of the centre frequency: b²."""
+    """Variance of frequency over an evenly filled band, divided by the square of the centre frequency: b²."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
 
 @dataclass(frozen=True, eq=False)
 class GroundMatrix:
-    """The matrix H of the module docstring: half the second derivative of V over the ground, without range errors.
+    """The matrix H of a collection without range errors, as defined in the module docstring.
+
+    H is half the second derivative, over the ground, of the variance V that the image point minimises.
 
     Attributes
     ----------
     slopes : (2, nodes, cases)
-        Change of the range error at the nodes per metre east, and per metre north. [m/m]
+        Change of the range error at each node per metre of displacement east, and per metre north. [m/m]
     fit : (4, nodes)
         Weights of `Sampling.fit`.
     band : (cases,)
@@ -152,7 +154,7 @@ class GroundMatrix:
     covariance : (2, 2, cases)
         Covariance of the gradient over the aperture.
     projection : (2, nodes, cases)
-        Weights of range errors ρ at the nodes that give ⟨g, ρ⟩, the scalar product of V with the gradient g.
+        Weights that give ⟨g, ρ⟩ from the range errors ρ at the nodes. ⟨ , ⟩ is the scalar product with ⟨ρ, ρ⟩ = V.
     xx, xy, yy : (cases,)
         Elements of H = ⟨g, gᵀ⟩.
     """
@@ -169,7 +171,10 @@ class GroundMatrix:
 
     @classmethod
     def of(cls, slopes: Floats, fit: Floats, band: Floats) -> "GroundMatrix":
-        """Compute H from the range error at the nodes per metre east, and per metre north, (2, nodes, cases)."""
+        """Compute H from `slopes`: the change of the range error at each node per metre east and per metre north.
+
+        `slopes` has the shape (2, nodes, cases). `fit` and `band` are fields of this class.
+        """
         weights, gradient = fit[0][:, None], fit[0] @ slopes
         apart = slopes - gradient[:, None]
         weighted = weights * apart
@@ -183,30 +188,33 @@ class GroundMatrix:
 
     @cached_property
     def determinant(self) -> Floats:
-        """Determinant of H: square of the area that the east and north parts of the gradient span."""
+        """Determinant of the matrix H: square of the area that the east and north components of the gradient span."""
         return np.asarray(self.xx * self.yy - self.xy * self.xy)
 
     @property
     def least(self) -> Floats:
-        """Smaller eigenvalue of H: increase of V per square metre in the direction with the worst resolution."""
+        """Smaller eigenvalue of the matrix H: increase of V per square metre in the direction of worst resolution."""
         half, apart = (self.xx + self.yy) / 2, np.hypot((self.xx - self.yy) / 2, self.xy)
         return np.asarray(self.determinant / (half + apart))
 
     @property
     def place_weights(self) -> tuple[Floats, Floats]:
-        """Displacement east and north per metre of range error at each node: −H⁻¹⟨g, ·⟩, (nodes, cases). [m/m]"""
+        """Displacement of the image point per metre of range error at each node: −H⁻¹⟨g, ·⟩. [m/m]
+
+        Returns the displacements east and north, (nodes, cases) each.
+        """
         (x, y), determinant = self.projection, self.determinant
         with np.errstate(all="ignore"):
             return (self.xy * y - self.yy * x) / determinant, (self.xy * x - self.xx * y) / determinant
 
     @property
     def sine(self) -> Floats:
-        """Sine of the angle θ between the ground directions that the bandwidth and the aperture resolve.
+        """Sine of the angle θ between the two ground directions in which bandwidth and aperture provide resolution.
 
-        The aperture resolves by the turn of the line of sight. The outer product of the mean gradient with itself and
-        the covariance of the gradient over the aperture are both scaled to unit trace. Their sum has the eigenvalues
-        1 ± cos θ and thus the condition number cot²(θ/2). For a short aperture θ is the angle between the range
-        gradient and the Doppler gradient.
+        The aperture provides resolution because the line of sight turns. The outer product of the mean gradient with
+        itself and the covariance of the gradient over the aperture are both scaled to unit trace. Their sum has the
+        eigenvalues 1 ± cos θ and thus the condition number cot²(θ/2). For a short aperture θ is the angle between the
+        range gradient and the Doppler gradient.
         """
         x, y = self.range_gradient
         square = x * x + y * y
@@ -219,10 +227,10 @@ class GroundMatrix:
 
     @property
     def turning(self) -> Floats:
-        """Linear (P₁) part of the perpendicular component of the range gradient, at the aperture edge. [m/m]
+        """Linear change of the range gradient across its mean direction, from mid-aperture to an aperture edge. [m/m]
 
-        The component is perpendicular to the mean gradient. Its linear part is computed from its variance over the
-        aperture.
+        This is the value, at the aperture edge, of the linear (P₁) part of the gradient's component across the mean
+        gradient. It is computed from the variance of this component over the aperture.
         """
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
@@ -231,13 +239,17 @@ class GroundMatrix:
 
     @cached_property
     def orientation(self) -> Floats:
-        """Signed area that the mean range and Doppler gradients span, computed by the function `orientation`."""
+        """Signed area of the parallelogram that the mean range and Doppler gradients span.
+
+        The function `orientation` computes the area.
+        """
         return orientation(self.slopes, self.fit, self.band, self.determinant)
 
     def turned_from(self, centre: "GroundMatrix", case: Indices) -> Floats:
-        """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
+        """Area that the range gradient spans over the aperture, relative to the area at the scene centre.
 
-        `case` contains the index of the case of each point. The fraction is computed by the function `turn`.
+        The ratio is negative for points beyond a fold, where the image is mirrored. It is computed by the function
+        `turn`. `case` contains the index of the case to which each point belongs.
         """
         return turn(self.determinant, self.orientation, centre, case)
 
@@ -245,8 +257,8 @@ class GroundMatrix:
 def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) -> Floats:
     """Signed area of the parallelogram that the mean range gradient and the mean Doppler gradient span.
 
-    The result is 0 if these two gradients contribute only a small part of the determinant of H, because the
-    resolution comes mostly from further variations of the gradient over the aperture. The first three parameters are
+    The result is set to 0 if these two mean gradients contribute only a small part of the determinant of H. The
+    resolution then comes mostly from variations of the gradient over the aperture. The first three parameters are
     fields of `GroundMatrix`, and the last is the determinant of H.
     """
     (x, y), (by_x, by_y) = fit[0] @ slopes, fit[1] @ slopes
@@ -256,11 +268,13 @@ def orientation(slopes: Floats, fit: Floats, band: Floats, determinant: Floats) 
 
 
 def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: Indices) -> Floats:
-    """Area that the gradient spans, as a fraction of the area at the scene centre; negative beyond a fold.
+    """Area that the range gradient spans over the aperture, relative to the area at the scene centre.
 
-    The area is the square root of the determinant of H. `centre` is the matrix at the scene centres, and `case`
-    contains the index of the case of each point. The sign is negative if the orientation of the gradients is opposite
-    to that at the centre.
+    The area is the square root of `determinant`, the determinant of the matrix H in the module docstring.
+    `orientation` is the result of the function `orientation`, whose sign shows on which side of a fold a point lies.
+    `centre` is the matrix at the scene centres, and `case` contains the index of the case to which each point
+    belongs. The ratio is negative if the sign of `orientation` is opposite to the sign at the scene centre. The point
+    then lies beyond a fold, where the image is mirrored.
     """
     at_centre, orientation_at_centre = centre.determinant, centre.orientation
     if at_centre.size > 1:
@@ -272,13 +286,13 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Evaluate the two criteria for an image plane, (cases,) each.
+    """Evaluate the two criteria for the existence of an image plane, (cases,) each.
 
-    The first is whether the sum of the lines of sight turns within the aperture. The second is `GroundMatrix.sine`,
-    the sine of the angle between the ground directions that the bandwidth and the aperture resolve. There is no
-    image plane if the sum does not turn, or if this angle is less than a degree. Both criteria refer to the whole
-    aperture. A full circle therefore has an image plane, and so has an aperture in which the range and Doppler
-    gradients are parallel only momentarily.
+    The first criterion is whether the sum of the lines of sight turns within the aperture. The second is
+    `GroundMatrix.sine`, the sine of the angle between the two ground directions in which bandwidth and aperture
+    provide resolution. There is no image plane if the sum does not turn, or if this angle is less than a degree. Both
+    criteria refer to the whole aperture. A full circle therefore has an image plane, and so has an aperture in which
+    the range and Doppler gradients are parallel only momentarily.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_PATH_NODES)))
@@ -296,7 +310,7 @@ def spans_ground(
 
 
 def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) -> str:
-    """Reason why a collection has no image plane; empty if it has one."""
+    """Reason why a collection has no image plane; empty if there is an image plane."""
     turns, sine = spans_ground(geometry, radar, aperture_time_s)
     if not turns[0]:
         return "both look vectors have a sum that never turns, so that Doppler does not change over the ground"

@@ -1,8 +1,8 @@
-"""Limits of the memory of a process (`ulimit -v`, `ulimit -d`), checked before libraries allocate memory.
+"""Memory limits of the process (`ulimit -v`, `ulimit -d`), checked before libraries allocate memory.
 
-A library in C may end the process if it gets no memory. OpenBLAS ends it with exit code 1, or with the signal of an
-interrupt, when NumPy is imported or first multiplies matrices; LLVM never returns. No code here can catch this. The
-known need for memory is therefore compared with the limit first.
+A C library may end the process if it cannot allocate memory. OpenBLAS does so when NumPy is imported or first
+multiplies matrices, either with exit code 1 or with the signal of an interrupt; LLVM never returns. Python code
+cannot catch this. If the memory needed is known, it is therefore compared with the limit first.
 """
 
 import errno
@@ -19,7 +19,7 @@ _MEMORY_ERRORS = ("failed to map segment", "annot allocate memory", "bad_alloc",
 
 
 def limit() -> int | None:
-    """Memory that this process may allocate, the smaller of `ulimit -v` and `ulimit -d`; None without a limit. [B]"""
+    """Memory that this process may allocate: the smaller of `ulimit -v` and `ulimit -d`; None if unlimited. [B]"""
     try:
         import resource
     except ImportError:  # Windows
@@ -29,17 +29,17 @@ def limit() -> int | None:
 
 
 def limit_words() -> str:
-    """Part of a message that states the limit; empty without a limit."""
+    """Phrase for a message that states the memory limit; empty if there is no limit."""
     allowed = limit()
     return "" if allowed is None else f"the system allows {allowed >> 20} MB (ulimit -v, ulimit -d)"
 
 
 def spare_threads() -> None:
-    """Limit OpenBLAS to one thread, if it is not loaded yet and the environment does not set a number of threads.
+    """Limit OpenBLAS to one thread; this has no effect if OpenBLAS is already loaded.
 
-    If the memory is limited, a number set in the environment is overridden. A second thread makes a check an eighth
-    slower and never faster, because products of matrices are small here. Each thread takes tens of MB, which count
-    towards the limit.
+    If the environment sets a number of threads, this number is kept, unless the memory of the process is limited.
+    With a second thread a check takes up to an eighth longer and is never faster, because the matrices to multiply
+    are small. Each thread takes tens of MB, which count towards the limit.
     """
     if limit() is not None:
         os.environ.update(OPENBLAS_NUM_THREADS="1", ARROW_DEFAULT_MEMORY_POOL="system")
@@ -63,7 +63,7 @@ def is_spacious() -> bool:
 def ran_out(error: BaseException) -> bool:
     """Whether an error, or one of its causes, is a lack of memory.
 
-    Close to the memory limit, any error counts as a lack of memory.
+    If the memory use of the process came close to its limit, any error counts as a lack of memory.
     """
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 

@@ -30,12 +30,12 @@ _NOTEBOOK_STYLE = """<style>
 
 
 def page(*elements: str) -> str:
-    """HTML of a result, which consists of a style sheet and the given elements."""
+    """HTML of a result: a style sheet, followed by the given elements."""
     return f'{_NOTEBOOK_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """HTML table; numbers are aligned to the right."""
+    """HTML table in which numbers are aligned to the right."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
@@ -48,5 +48,5 @@ def _cell(value: object) -> str:
 
 
 def note(text: str) -> str:
-    """HTML of a line of text below the result."""
+    """HTML of a line of small print below a result."""
     return f'<p class="muted">{escape(text)}</p>'

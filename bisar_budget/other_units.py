@@ -1,7 +1,7 @@
 """Units that are recognised but not accepted: inches, mils, unit names in words, and unlisted prefixes.
 
-A message can convert the quantity to an accepted unit, or suggest the intended spelling. It never suggests a unit
-that changes the size of the quantity. The module is imported only after a unit was refused.
+They are used in messages, which convert the quantity to an accepted unit, or suggest the intended spelling. A message
+never suggests a unit that changes the size of the quantity. The module is imported only after a unit was refused.
 """
 
 import math
@@ -24,7 +24,7 @@ class UnitValue(NamedTuple):
     powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def times(self, other: "UnitValue", exponent: float = 1.0) -> "UnitValue":
-        """Product of this unit and another unit that is raised to the power `exponent`."""
+        """Multiply this unit by another unit that is raised to the power `exponent`."""
         a, b = self.powers, other.powers
         powers = (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2])
         return UnitValue(self.factor * other.factor**exponent, powers)
@@ -144,7 +144,10 @@ _SEXAGESIMAL = re.compile(
 
 
 def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
-    """Problem and hint for the message about a number whose unit is not in any table of units."""
+    """Problem and hint for the error message about a number with an unknown unit.
+
+    `digits` is the number and `written` the unit, both as written in the file.
+    """
     unit = normal_unit(written)
     sexagesimal = _SEXAGESIMAL.fullmatch(digits + written) if dimension.si == "rad" else None
     if sexagesimal is not None:
@@ -178,13 +181,13 @@ def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, st
 
 
 def is_of(written: str, dimension: Dimension) -> bool:
-    """Whether a unit, accepted or only recognised, belongs to a dimension."""
+    """Whether a unit belongs to a dimension; the unit may be accepted or only recognised."""
     value = value_of_unit(normal_unit(written))
     return value is not None and value.powers == _powers_of(dimension)
 
 
 def value_of_unit(unit: str) -> UnitValue | None:
-    """Value of a product, quotient, power or square root of known units; None if the unit cannot be interpreted."""
+    """Value of a unit that is a product, quotient, power or square root of known units; None if it is unknown."""
     tokens: list[str] = []
     end = 0
     while end < len(unit):
@@ -203,7 +206,8 @@ def value_of_unit(unit: str) -> UnitValue | None:
 def _product(tokens: list[str]) -> UnitValue | None:
     """Parse a product of units, up to a closing bracket or the end of the tokens, and return its value.
 
-    The parsed tokens are removed from `tokens`; the closing bracket is kept. The result is None if a unit is unknown.
+    The parsed tokens are removed from `tokens`; the closing bracket is not removed. The result is None if a unit is
+    unknown.
     """
     value = UnitValue(1.0)
     sign = 1.0
@@ -237,7 +241,7 @@ def _power(tokens: list[str]) -> UnitValue | None:
 
 
 def _atom(name: str) -> UnitValue | None:
-    """Value of one unit, given as a symbol or as a word, with or without a prefix; None if it is unknown."""
+    """Value of a single unit, given as a symbol or as a word, with or without a prefix; None if it is unknown."""
     for prefix, factor in {"": 1.0, **_SI_PREFIXES}.items():
         of_name = _ATOMS.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
         if of_name is not None and (not prefix or prefix in of_name[2]):
@@ -259,7 +263,7 @@ def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
 
 
 def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
-    """Unit of a dimension that has the same size as `value`; empty if there is none."""
+    """Unit of a dimension that has the same size as the unit `value`; empty if there is no such unit."""
     return next((unit for unit, factor in dimension.units.items() if unit and _is_equal(factor, value.factor)), "")
 
 
@@ -268,13 +272,13 @@ def _is_equal(a: float, b: float) -> bool:
 
 
 def _converted(digits: str, written: str, factor: float, dimension: Dimension) -> str:
-    """Text that converts a number with a unit to an accepted unit."""
+    """Text that converts a number to an accepted unit, such as "10 in is 0.254 m"; empty if it overflows."""
     value = float(digits) * factor
     return f"{digits} {written} is {format_quantity(value, dimension.si, 9)}" if math.isfinite(value) else ""
 
 
 def _respelt(unit: str, dimension: Dimension) -> str:
-    """Unit of a dimension whose spelling differs from `unit` only in upper and lower case, or by one typing error.
+    """Unit of a dimension that differs from `unit` only in upper and lower case, or by a single typing error.
 
     The result is empty if there is no such unit, or if two units of different size are equally similar to `unit`.
     """
@@ -298,9 +302,9 @@ def _is_one_size(factors: list[float]) -> bool:
 
 
 def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
-    """Yield the units of a dimension and their factors, including units with prefixes that are not accepted.
+    """Yield the units of a dimension with their factors, including units with prefixes that are not accepted.
 
-    The user may have meant such a unit, so it must not be corrected to a unit of a different size.
+    The user may have meant such a unit. A misspelt unit must therefore not be corrected to a unit of another size.
     """
     powers = _powers_of(dimension)
     for unit, factor in dimension.units.items():
@@ -317,7 +321,7 @@ def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
 
 
 def _is_one_slip(a: str, b: str) -> bool:
-    """Whether two strings differ at most by one extra, missing or wrong letter, or by two transposed letters."""
+    """Whether two strings differ by at most one extra, missing or wrong letter, or by two transposed letters."""
     if a == b or abs(len(a) - len(b)) > 1:
         return a == b
     start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

@@ -1,4 +1,4 @@
-"""Environment of a command: files of the package, files of the user, and the number of processors."""
+"""Resources of a command: bundled files, files of the user, and the number of processors."""
 
 import os
 import stat
@@ -26,10 +26,10 @@ FILES_READ: set[tuple[int, int]] = set()
 
 
 class FilesHeld:
-    """Contents of the files that a command reads, as first read, so that all its outputs use the same contents.
+    """Contents of the files that a command reads, kept as first read, so that all outputs use the same contents.
 
-    Contents are kept up to a total of 64 MB. If this is exceeded, only a hash of each further file is kept. Such a
-    file is refused if it has changed when it is read again.
+    Contents are kept up to a total of 64 MB. Beyond that, only a hash of each further file is kept. If such a file
+    has changed when it is read again, an error is raised.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class FilesHeld:
     def content(self, file: str, most: int, read: Callable[[], bytes]) -> bytes:
         """Content of a file as first read, at most `most` + 1 bytes.
 
-        `read` is called if the file was not read before, or if its content was not kept.
+        `read` is called if the file was not read before, or if only its hash was kept.
         """
         key = (file if file == "-" else os.path.normpath(file), most)
         held_content = self.known.get(key)
@@ -70,25 +70,22 @@ _held: FilesHeld | None = None  # None outside of a command: a caller of functio
 
 
 def hold_files() -> None:
-    """Begin a command: forget all files, and keep the content of each file from now on.
-
-    The content is kept as it is when a file is first read.
-    """
+    """Begin a command: forget all contents of files, and keep the content of each file that is read from now on."""
     global _held
     FILES_READ.clear()
     _held = FilesHeld()
 
 
 def release_files() -> None:
-    """End a command. From now on, reading a file gives its current content."""
+    """End a command. From now on, the current content of a file is read."""
     global _held
     _held = None
 
 
 def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
-    """Content of a file as this command first read it, see `FilesHeld.content`.
+    """Content of a file as this command first read it; see `FilesHeld.content`.
 
-    Outside a command, the result is the content that `read` returns.
+    Outside a command, `read` is called and its result is returned.
     """
     return read() if _held is None else _held.content(file, most, read)
 
@@ -108,7 +105,7 @@ _STREAMS = (
 def special_file(path: str) -> str:
     """Kind of a special file, such as `a named pipe`; empty for an ordinary file.
 
-    Reading a special file may block or never end. Open streams of this process, such as the streams of `<(…)` in a
+    Reading a special file may block or never end. Streams that are already open in this process, such as `<(…)` in a
     shell, do not count as special files.
     """
     if os.path.abspath(path).startswith(_STREAMS):
@@ -125,7 +122,7 @@ def special_file(path: str) -> str:
 
 
 class UnreadableError(Exception):
-    """A file cannot be read. The message begins with its name; `is_missing` is true if the file does not exist."""
+    """A file cannot be read. The message begins with the file name; `is_missing` is true if there is no such file."""
 
     def __init__(self, message: str, *, is_missing: bool = False) -> None:
         super().__init__(message)
@@ -158,38 +155,39 @@ class Files(Protocol):
     """Source of the files of a project: the disk, or a git revision (`mission.revision`)."""
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a regular file; the first `most` + 1 bytes of a file that is larger than `most`.
+        """Content of a regular file. If the file is larger than `most`, only the first `most` + 1 bytes are returned.
 
         Parameters
         ----------
         file : str
             Path of the file.
         most : int
-            Limit in bytes. The caller must refuse a larger file.
+            Largest accepted size in bytes. The caller must reject a larger file.
         called : str, optional
-            Name of the file in messages, instead of `file`.
+            Name of the file in messages, if it differs from `file`.
 
         Raises
         ------
         UnreadableError
-            The file cannot be read, or is not a regular file: a read of a pipe would wait, and a device never ends.
+            The file cannot be read, or is not a regular file. Reading a pipe could block, and reading a device could
+            go on for ever.
         """
 
     def names(self, folder: str) -> list[str]:
-        """Names of the files in a folder, sorted; raises `OSError` if the folder cannot be listed."""
+        """Return the sorted names of the files in a folder. Raises `OSError` if the folder cannot be listed."""
 
 
 class Disk:
-    """The current files on the disk, or their contents as this command first read them."""
+    """The current files on the disk. Within a command, each file has the content with which it was first read."""
 
     @staticmethod
     def content(file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file; see `Files`."""
+        """Content of a file; see `Files.content`."""
         return held(file, most, lambda: _read(file, most, file if called is None else called))
 
     @staticmethod
     def names(folder: str) -> list[str]:
-        """Names of the files in a folder; see `Files`."""
+        """Names of the files in a folder; see `Files.names`."""
         return sorted(os.listdir(folder))
 
 
@@ -197,14 +195,14 @@ DISK = Disk()
 
 
 def locked(folder: str) -> int | None:
-    """Lock a folder for this process until the returned descriptor is closed or the process ends.
+    """Lock a folder for this process. The lock is held until the returned descriptor is closed or the process ends.
 
-    Returns None if the operating system or the file system has no locks.
+    Returns None if the operating system or the file system does not support locks.
 
     Raises
     ------
     BlockingIOError
-        Another process has the lock.
+        Another process holds the lock.
     OSError
         The folder does not exist, or the user may not open it.
     """

@@ -1,4 +1,4 @@
-"""Defaults of a project for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has one."""
+"""Defaults of a project for `check`: the table `[tool.bisar-budget]` of the nearest `pyproject.toml` that has it."""
 
 import os
 import re
@@ -39,7 +39,7 @@ class SettingsError(Exception):
 
 @dataclass(frozen=True)
 class Settings:
-    """Keys and values of the table `[tool.bisar-budget]`; `file` is the file that contains it, for messages."""
+    """Keys and values of the table `[tool.bisar-budget]`. `file` is the path of its file, for messages."""
 
     file: str
     values: SettingValues
@@ -48,16 +48,14 @@ class Settings:
 def project_settings(folder: str, files: Files = DISK) -> Settings | None:
     """Read the table `[tool.bisar-budget]` that applies to a folder; None if there is no such table.
 
-    It is read from the nearest `pyproject.toml` with this table, in the folder or above it.
-
-    `files` is the source of the `pyproject.toml` files: the disk, or a git revision.
-
-    Names of reports and folders of sensors are relative to the file that states them.
+    The table is read from the nearest `pyproject.toml` that contains it, in the folder or above. `files` is the
+    source of the `pyproject.toml` files: the disk, or a git revision. In the file, names of reports and folders of
+    sensors are relative to the folder of the `pyproject.toml`.
 
     Raises
     ------
     SettingsError
-        The file is not a regular file, or not TOML in UTF-8; a key is unknown, or a value has the wrong type.
+        The file is not a regular file, or is not TOML in UTF-8; or a key is unknown, or a value has the wrong type.
     """
     folder = os.path.abspath(folder)
     while True:
@@ -72,7 +70,7 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 @lru_cache(maxsize=4)
 def _parsed(file: str, data: bytes) -> Settings | None:
-    """Read the table `[tool.bisar-budget]` from the content of a `pyproject.toml`; None if it has no such table.
+    """Read the table `[tool.bisar-budget]` from the content of a `pyproject.toml`; None if there is no such table.
 
     The last results are cached, because the same table may be read for many missions.
     """

@@ -1,4 +1,4 @@
-"""Quantities as text: read `9.6 GHz` as a number in SI, and write such a number as `9.60 GHz`.
+"""Quantities as text: read `9.6 GHz` as a number in SI units, and write an SI number as `9.60 GHz`.
 
 The module has its own small table of units, because general unit libraries read `3 dBi` as three amperes.
 """
@@ -19,12 +19,12 @@ _MAX_QUANTITY_CHARACTERS = 64  # longer text is not a quantity
 
 
 class Dimension:
-    """Kind of quantity: its name with an article, the unit of a bare number, and all units with their factors.
+    """Kind of quantity: its name with an article, the unit of a number without a unit, and all accepted units.
 
     `scales` maps each accepted unit to a factor and a divisor, one of which is 1. Division by a whole number keeps
-    decimals exact: 5 mm is 0.005 m to the bit. `usual` names the usual units if every number needs a unit; it is
-    empty if a bare number is in SI. `offsets` maps further decibel units to the number of decibels that is added to
-    their values on reading.
+    decimals exact: 5 mm is exactly the same number as 0.005 m. If every number needs a unit, `usual` names the usual
+    units; it is empty if a number without a unit is taken as SI. `offsets` maps additional decibel units to the
+    number of decibels that must be added to convert a value from this unit.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Dimension:
 
 
 def _scale(factor: float) -> tuple[float, float]:
-    """Factor and divisor, one of which is 1, that convert a unit with the given factor to SI."""
+    """Factor and divisor, one of which is 1, that together convert a unit with the given factor to SI."""
     inverse = float(round(1 / factor))
     return (1.0, inverse) if inverse and abs(inverse * factor - 1) < 1e-12 else (factor, 1.0)
 
@@ -232,12 +232,13 @@ _OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimen
 def parse_quantity(value: object, dimension: Dimension) -> float:
     """Read a quantity such as `31 km`, `9.6GHz`, `2 µrad` or `1e-12`.
 
-    A bare number is in SI, or in decibels for a dimension in decibels. A bare angle is refused, except zero.
+    A number without a unit is in SI units, or in decibels if the dimension is measured in decibels. An angle without
+    a unit is rejected unless it is zero.
 
     Parameters
     ----------
     value : str, int or float
-        Value in the mission file.
+        Value as given in the mission file.
     dimension : Dimension
         Required dimension of the value.
 
@@ -263,7 +264,7 @@ def parse_quantity(value: object, dimension: Dimension) -> float:
 
 
 def _parse_closely(value: object, dimension: Dimension) -> float:
-    """Read a quantity in any accepted form, or raise an error that explains why the value cannot be read."""
+    """Read a quantity in any accepted form. If it cannot be read, an error that explains the reason is raised."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise _invalid(f"must be {dimension.name}", dimension)
     if not isinstance(value, str):
@@ -292,9 +293,9 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
 
 
 def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
-    """Write an SI value with a readable prefix: 0.005 m/s^2 is `5 mm/s²`.
+    """Write an SI value with a readable prefix: 0.005 m/s^2 becomes `5 mm/s²`.
 
-    `rounding` is `nearest` or `down`; a limit is rounded down, so that the printed limit still passes.
+    `rounding` is `nearest` or `down`. Limits are rounded down, so that the printed value is within the limit.
     """
     size, suffix = abs(value), ""
     for scale, smallest, largest, its_suffix in _steps(unit):
@@ -311,17 +312,17 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
 
 def unit_behind(text: str) -> str:
-    """Unit after the number in a string, as written; the whole string if it contains no number."""
+    """Return the unit after the number in a string, as written; the whole string if it contains no number."""
     text = text.strip()
     match = _NUMBER.match(text)
     return text[match.end() :].strip() if match else text
 
 
 def given_unit(text: str, unit: str) -> str:
-    """Unit after the number in a string, spelt as in the tables of units.
+    """Return the unit that follows the number in a string, spelt as in the tables of units.
 
-    `unit` is an SI unit. The result is empty if the string has no unit, or is not a quantity of the same dimension as
-    `unit`.
+    `unit` is an SI unit. The result is empty if the string contains no unit, or if it is not a quantity of the same
+    dimension as `unit`.
     """
     match = _NUMBER.match(text.strip()) if len(text) <= _MAX_QUANTITY_CHARACTERS else None
     dimension = _OF_SI.get(unit)
@@ -333,10 +334,10 @@ def given_unit(text: str, unit: str) -> str:
 
 
 def format_in(value: float, unit: str, written_unit: str, digits: int = 3, rounding: str = "nearest") -> str:
-    """Write an SI value in `written_unit`, a unit of the same dimension: 349 µrad is `0.02 deg`.
+    """Write an SI value in `written_unit`, a unit of the same dimension as `unit`: 349 µrad becomes `0.02 deg`.
 
-    If `written_unit` is empty, or for a level in dB, the text is that of `format_quantity`. Numbers from 1e6 on, and
-    numbers below 1e-4, have an exponent, such as `2e6`.
+    If `written_unit` is empty, or if the value is a level in dB, the value is written as by `format_quantity`.
+    Numbers of at least 1e6 or below 1e-4 are written with an exponent, such as `2e6`.
     """
     if not written_unit or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)
@@ -350,7 +351,7 @@ def format_in(value: float, unit: str, written_unit: str, digits: int = 3, round
 
 @cache
 def _pretty(written_unit: str) -> str:
-    """Write a unit of the tables in print form: `um` as µm, `m/s^2` as m/s², `deg/sqrt(h)` as deg/√h, `1/s` as /s."""
+    """Write a unit of the tables for display: `um` as µm, `m/s^2` as m/s², `deg/sqrt(h)` as deg/√h, `1/s` as /s."""
     text = written_unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
@@ -358,7 +359,7 @@ def _pretty(written_unit: str) -> str:
 
 
 def format_limit(limit: float, unit: str) -> str:
-    """Write a limit, rounded down; radians have no prefix, so that readers recognise π/4."""
+    """Write a limit, rounded down. Radians are written without a prefix, so that readers recognise π/4."""
     return f"{_rounded(limit, 3, 'down')} rad" if unit == "rad" else format_quantity(limit, unit, 3, "down")
 
 
@@ -386,10 +387,10 @@ _SHEETS = {
 
 @cache
 def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
-    """List the printed forms of a unit, with each usual prefix and finally without a prefix.
+    """List the forms in which a unit can be printed: with each usual prefix, and finally without a prefix.
 
     A form has four entries: the factor that converts to SI, the smallest SI value for which the form is used, the SI
-    value from which the form is no longer used, and the string after the number.
+    value from which the form is no longer used, and the text after the number.
     """
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
@@ -403,7 +404,7 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
 
 
 def _stricter(level: float, digits: int) -> str:
-    """Write a negative level in dB, rounded to a lower level, which is the stricter limit."""
+    """Write a negative level in dB, rounded down to a lower level, which is a stricter limit."""
     step = 10.0 ** (math.floor(math.log10(-level)) - digits + 1)
     return f"{math.floor(level / step * (1 - 1e-12)) * step:.{digits}g}"
 

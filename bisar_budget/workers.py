@@ -1,4 +1,4 @@
-"""Tools for long computations: reports of progress, and worker processes that end when the command ends."""
+"""Tools for long computations: progress reports, and worker processes that end when the command ends."""
 
 import os
 import signal
@@ -23,10 +23,10 @@ Result = TypeVar("Result")
 
 
 class MapBlocks(Protocol):
-    """Type of functions that distribute many blocks of work over worker processes.
+    """Type of a function that distributes many blocks of work to worker processes.
 
     Such a function calls `function` with the common data and each block, and yields each block with its result, in
-    any order. `about` returns the description of a block for messages.
+    any order. `about` returns a description of a block for messages.
     """
 
     def __call__(
@@ -44,16 +44,16 @@ _POOL_TIMEOUT_S = 10.0  # to wait for the pool's own thread, which ends as soon 
 
 
 def unseen(done: int, total: int) -> None:
-    """Ignore a report of progress; used if progress is not shown."""
+    """Ignore a progress report. This function is used if progress is not shown."""
 
 
 @contextmanager
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
     """Context manager for a pool of processes, all of which have ended when the context is left.
 
-    `start` is `spawn` for fresh interpreters; a fork would copy the threads of a numerical library in an undefined
-    state. Raises a `WorkerLostError` if a worker is ended from outside, for example by the system when memory runs
-    out.
+    `start` is a start method of `multiprocessing`. With `spawn`, workers are fresh interpreters, whereas a fork would
+    copy the threads of a numerical library in an undefined state. Raises a `WorkerLostError` if a worker is ended
+    from outside, for example by the operating system when memory runs out.
     """
     worker_count = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
@@ -76,7 +76,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
 def in_processes(count: int) -> MapBlocks:
     """Return a `MapBlocks` function that uses `count` worker processes of this machine.
 
-    It yields results in the order of the blocks, and computes only a few blocks in advance.
+    The function yields results in the order of the blocks, and computes only a few blocks in advance.
     """
 
     def mapped(
@@ -99,7 +99,7 @@ def in_processes(count: int) -> MapBlocks:
 
 
 def _begin() -> None:
-    """Set up a worker process: it ignores interrupts, ends with its parent, and hides warnings of libraries."""
+    """Set up a worker process: ignore interrupts, end with the parent process, and suppress warnings of libraries."""
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("SIGTERM", "SIGHUP"):  # a fork has the handlers of the command

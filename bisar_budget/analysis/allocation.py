@@ -27,8 +27,8 @@ EQUAL = Shares(transmitter=0.5, receiver=0.5)
 class Allocation(NamedTuple):
     """Budgets of a mission, divided between transmitter, receiver and clock.
 
-    `qpe_total` is the budget of the quadratic phase error (QPE) for the whole mission, without autofocus. [rad] The
-    owners of a budget are transmitter, receiver and clock. `qpe`, `pslr` and `islr` are their shares in the budgets
+    `qpe_total` [rad] is the budget of the quadratic phase error (QPE) for the whole mission, without autofocus. The
+    owners of a budget are transmitter, receiver and clock. `qpe`, `pslr` and `islr` are their shares of the budgets
     of QPE, PSLR and ISLR. The shares of PSLR and ISLR are shares of power.
 
     Autofocus corrects up to π·N_pull rad at the aperture edge. `n_pull_stated` is the N_pull in the mission file
@@ -47,21 +47,27 @@ class Allocation(NamedTuple):
     def autofocus_gain(self) -> Any:
         """Factor by which autofocus raises the limits of the quadratic phase error: π·N_pull/`qpe_total`, at least 1.
 
-        The factor is 1 without autofocus. It follows from Section VI of the paper. For a `qpe_total` of π/4 it is
-        4·N_pull.
+        The factor is 1 without autofocus. The formula follows from Section VI of Rigling & Moses. For a `qpe_total`
+        of π/4 it gives 4·N_pull.
         """
         return _gain(self.n_pull, self.qpe_total)
 
     def qpe_limit(self, owner: str) -> float:
-        """Largest quadratic phase error that an owner may have without autofocus. [rad]"""
+        """Largest quadratic phase error that an owner may have without autofocus. [rad]
+
+        `owner` is `transmitter`, `receiver`, `clock`, or `mission` for the whole mission.
+        """
         return self.qpe.of(owner) * self.qpe_total
 
     def qpe_allowed(self, owner: str) -> Any:
-        """Largest quadratic phase error that an owner may have with the mission's autofocus. [rad]"""
+        """Largest quadratic phase error that an owner may have with the mission's autofocus. [rad]
+
+        `owner` is `transmitter`, `receiver`, `clock`, or `mission` for the whole mission.
+        """
         return self.qpe_limit(owner) * self.autofocus_gain
 
     def of(self, case: int) -> "Allocation":
-        """Return the budgets of one case as plain numbers.
+        """Return the budgets of one case as single numbers instead of arrays.
 
         `case` is the index of the case in the arrays (cases,).
         """
@@ -70,10 +76,11 @@ class Allocation(NamedTuple):
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
         """Write a note with the smallest N_pull for which a phase error passes, or with the reason why it fails.
 
-        `qpe` is the quadratic phase at the aperture edge, which autofocus corrects. [rad] `hidden` is the quadratic
-        phase that would cause the same peak loss as the errors that autofocus does not correct. [rad] The judged
-        phase is the root-sum-square of `qpe` and of `hidden` times the autofocus gain. Therefore the phase error
-        fails for any N_pull if `hidden` reaches the owner's limit without autofocus.
+        `qpe` [rad] is the quadratic phase at the aperture edge, which autofocus corrects. `hidden` [rad] is the
+        quadratic phase that would cause the same peak loss as the part of the error that autofocus does not correct.
+        The phase to compare with the limit is the root-sum-square of two phases: `qpe`, and `hidden` times the
+        autofocus gain. The limit grows with the same gain. If `hidden` reaches the limit that the owner has without
+        autofocus, the phase error therefore fails for any N_pull.
         """
         room = 1 - (hidden / self.qpe_limit(owner)) ** 2
         if room <= 0:
@@ -117,8 +124,9 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
     mission : Mission
         Mission whose budgets are divided. Some of its numbers may be arrays (cases,).
     gates : iterable of Together
-        Declared errors in each gating model. They are used only for the split `balanced`, which sets the shares in
-        proportion to the phases of these errors. The shares are then arrays (cases,) if there are several cases.
+        Declared errors in each gating model, that is each model whose verdict counts. They are used only for the
+        split `balanced`, which sets the shares in proportion to the phases of these errors. The shares are then
+        arrays (cases,) if there are several cases.
     """
     split = mission.allocation.split
     qpe, pslr, islr = (
@@ -135,10 +143,11 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 
 
 def _balanced(gates: Sequence[Together]) -> Shares:
-    """Shares of transmitter and receiver in proportion to the combined phases of their declared errors.
+    """Divide a budget between transmitter and receiver in proportion to the combined phases of their declared errors.
 
-    `gates` holds the declared errors in each gating model. With two gating models, each error counts with the larger
-    of its two judged phases. Each share is limited to `BALANCED_RANGE`. Both shares are 1/2 if all phases are 0.
+    `gates` holds the declared errors in each gating model, that is each model whose verdict counts. With two such
+    models, the larger of the two phases of an error is used. Each share is limited to `BALANCED_RANGE`. Both shares
+    are 1/2 if all phases are 0.
     """
     weights = []
     for owner in ("transmitter", "receiver"):
@@ -155,7 +164,7 @@ def _balanced(gates: Sequence[Together]) -> Shares:
 
 
 def _largest(phases: Sequence[Floats]) -> Floats:
-    """Phase with the largest magnitude among several arrays (cases,), with its sign, for each case. [rad]"""
+    """For each case, return the signed phase with the largest magnitude among several arrays (cases,). [rad]"""
     if len(phases) == 1:
         return phases[0]
     of_all = np.array(phases)
@@ -185,8 +194,8 @@ class Caps(NamedTuple):
 
     Autofocus also fails, and leaves the image smeared, if it works on too small a patch of the image. This does not
     depend on range walk or bandwidth. Phase gradient autofocus needs a patch three times as wide as the smear, and
-    map drift autofocus needs a patch 1.5 times as wide. This was found for range walks of a hundredth of a cell and
-    of a third of a cell.
+    map drift autofocus needs a patch 1.5 times as wide. Both factors were found for range walks of a hundredth of a
+    cell and of a third of a cell.
     """
 
     walk: float
@@ -219,7 +228,9 @@ def effective_n_pull(mission: Mission) -> float | None:
 
 
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
-    """Write a note with the N_pull that an error needs to pass, or with the upper bound that this N_pull exceeds.
+    """Write a note with the N_pull that an error needs to pass.
+
+    If this N_pull exceeds one of the upper bounds, the note gives the bound as well.
 
     Parameters
     ----------
@@ -240,7 +251,7 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
 def _up(number: float) -> str:
     """Format a number with three significant digits, rounded up.
 
-    Numbers from 100 on are written as whole numbers with a space between thousands.
+    Numbers of 100 or more are written as whole numbers, with a space as thousands separator.
     """
     if number >= 100:
         return f"{math.ceil(number * (1 - 1e-12)):,}".replace(",", " ")
@@ -251,7 +262,7 @@ def _up(number: float) -> str:
 def rounded_down(number: float) -> str:
     """Format a number with three significant digits, rounded down.
 
-    Numbers from 100 on are written as whole numbers with a space between thousands.
+    Numbers of 100 or more are written as whole numbers, with a space as thousands separator.
     """
     if number >= 100:
         return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")

@@ -1,7 +1,8 @@
 """Analysis of a mission for the checks: its geometry, its errors, and their effects in the two models.
 
-A case is a mission with definite numbers. Cases whose mission files have the same structure are analysed together, in
-arrays (cases,). `Case` gives the plain numbers of a single case for the text of a report.
+A case is a mission in which each number has a single value. Cases whose mission files have the same structure are
+analysed together, in arrays (cases,). `Case` provides the results of a single case as plain numbers, for the text of
+a report.
 """
 
 import math
@@ -67,8 +68,8 @@ class Analysis:
         Number of quadrature nodes over the aperture, the same for all cases. If omitted, it follows from the
         geometry.
     shown : mapping of str to Subject, optional
-        Rows whose allowable is needed even if the file declares no error for them. The keys are the ids of the rows.
-        If omitted, all rows are included.
+        Rows of the report whose allowable is needed even if the file declares no error for them. The keys are the ids
+        of the rows. If omitted, all rows are included.
     is_complete : bool
         Compute all numbers of each row, not only those that decide the result. The results of a case then do not
         depend on how many cases are analysed together.
@@ -96,15 +97,15 @@ class Analysis:
     groups : tuple of Correlated
         Covariances that the mission declares for the errors of its platforms.
     gates : list of str
-        Names of the gating models. The list contains both models if the stricter model decides, otherwise a single
-        name.
+        Names of the gating models, which are the models whose verdicts count. The list contains both models if the
+        stricter verdict decides, otherwise a single name.
     published, full : Model
-        Effects of the errors in each model. The published model follows Tables I and II and (25) and does not include
-        the direct path. The full model follows from exact ranges.
+        Effects of the errors in each model. The published model follows Tables I and II and equation (25) of the
+        paper, and does not include the direct path. The full model follows from exact ranges.
     allocation : Allocation
         Budgets of the cases, divided between transmitter, receiver and clock. The split `balanced` divides in
-        proportion to the phases in the gating model. Under `strictest` it uses the larger of the phases in the two
-        models.
+        proportion to the phases in the model whose verdict counts. If the verdicts of both models count, it uses the
+        larger of the two phases.
     noise : dict of str to list of SpreadPhase
         Phase errors due to noise, see `spread.noise`. The keys are the names of the models.
     rests : dict of str to list of SpreadPhase
@@ -156,20 +157,26 @@ class Analysis:
             self.resolution = resolution(self.exact, self.geometry, mission.radar, mission.collection.aperture_time)
 
     def together(self, model: str) -> Together:
-        """Return the declared errors and their combination according to `model`, `published` or `full`."""
+        """Return the declared errors and their combination in the given model.
+
+        `model` is `published` or `full`.
+        """
         return self._together[model]
 
     def models(self, gating: str) -> tuple[Model, Model]:
-        """Return both models, with the gating model first.
+        """Return both models, starting with the model whose verdict counts.
 
-        `gating` is the name of the gating model, `published` or `full`.
+        `gating` is the name of the gating model, whose verdict counts: `published` or `full`.
         """
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
     # ---------------------------------------------------------------- a single case
     @property
     def sources(self) -> list[ErrorSource]:
-        """List the errors of an analysis with a single case in plain numbers, in the order of the report's rows."""
+        """List the errors of a single-case analysis in the order of the rows in the report.
+
+        The results are single numbers instead of arrays.
+        """
         return [error.in_one_case() for error in self.errors.listed]
 
     @property
@@ -179,7 +186,7 @@ class Analysis:
 
 
 class Case:
-    """Results of an analysis for one of its cases, in plain numbers.
+    """Results of an analysis for one of its cases, as single numbers instead of arrays.
 
     Parameters
     ----------

@@ -1,11 +1,14 @@
 """Loss of the image peak due to all declared errors, for many cases at once.
 
 An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps the
-fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band. The mean over the aperture is
-computed as a sum over its nodes. With a random error whose phase has the variance σ², the peak keeps the fraction
-exp(-σ²) of its power. The same holds for a tone of unknown phase. The losses of independent errors in decibels are
-added, because the variances of their phases add (to second order). Derived here. `tests/theory/test_image_point.py`
-checks it against images formed by direct sums.
+fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band, f₀ is the centre frequency, and
+k is the wavenumber at f₀. The mean over the aperture is computed as a sum over its nodes. With a random error whose
+phase has the variance σ², the peak keeps the fraction exp(-σ²) of its power. The same holds for a tone of unknown
+phase. The losses of independent errors, in decibels, are added, because the variances of their phases add (to second
+order).
+
+These relations are not in the paper; they are derived here. `tests/theory/test_image_point.py` checks them against
+images formed by direct sums.
 """
 
 import math
@@ -103,7 +106,7 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
 def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
     """Losses of the image peak due to range errors over the aperture, (..., cases). [dB]
 
-    `remaining` are the range errors at the aperture's nodes that remain at the image point, (..., nodes, cases). [m]
+    `remaining` (..., nodes, cases) [m] are the range errors at the aperture's nodes that remain at the image point.
     """
     sampling = exact.sampling
     if (

@@ -1,10 +1,11 @@
 """Change of the quadratic phase error from the scene centre to the scene's edge, for many cases at once.
 
-The paper's errors are spatially invariant. In the full model they are not, because the lines of sight of both
-platforms at a point p of the scene differ from the lines of sight at the scene centre. The exact ranges are therefore
-computed with p in place of the scene centre. An autofocus correction is a single phase history for the whole image,
-so it does not remove the difference between the phases at p and at the centre. Derived here.
-`tests/simulate/test_scene_edge.py` checks it against exact ranges and against images at 250 m and 1 km.
+In the model of Rigling & Moses, the effects of errors are spatially invariant. In the full model they are not,
+because the lines of sight of both platforms at a point p of the scene differ from the lines of sight at the scene
+centre. The full model therefore uses the exact ranges to p, not the ranges to the scene centre. An autofocus
+correction is a single phase history for the whole image, so it does not remove the difference between the phases at p
+and at the centre. The computation is derived here. `tests/simulate/test_scene_edge.py` checks it against exact ranges
+and against images at 250 m and 1 km.
 
 The requirement is that this phase difference stays within the total budget without the gain of autofocus. The reason
 is that the difference remains after autofocus has corrected an error of any size. Without autofocus, the difference
@@ -12,9 +13,9 @@ is the phase that the edge adds to the phase at the centre. The rows of the repo
 also warns if the phase at the edge exceeds a limit that the phase at the centre meets. This limit includes the
 autofocus gain.
 
-A place is a ground point of the scene in one of the cases. The argument `of` holds the index of the case for each
-place. Along the axis "errors and parts", an array holds first the errors of motion and clocks. Then it holds the
-independent parts of which the random errors are composed (`scene_random`).
+In this module, a place is a ground point of the scene in one of the cases. The argument `of` of its functions holds
+the index of the case for each place. Along the axis "errors and parts", an array holds first the errors of motion and
+clocks. Then it holds the independent parts of which the random errors are composed (`scene_random`).
 """
 
 import math
@@ -62,8 +63,8 @@ class SceneSettings:
     max_climb_rounds : int
         Largest number of rounds of a search for a maximum. Each round searches a quarter of the previous arc.
     narrow_clearance_ratio : float
-        Largest clearance, see `ScenePlaces`, that matters to the search. A local minimum of the clearance is searched
-        only if it is expected below this value.
+        Threshold of the clearance, see `ScenePlaces`. A local minimum of the clearance is searched for only if it is
+        expected to lie below this threshold.
     max_radius_fraction : float
         Largest radius to examine when searching for the radius within which one autofocus correction is sufficient,
         as a fraction of the shorter slant range.
@@ -73,22 +74,21 @@ class SceneSettings:
         Tolerance of the phase difference, as a fraction of the total budget. A radius found from first-order effects
         is kept if the exact phase difference at this radius deviates from the budget by at most this tolerance.
     max_azimuth_rounds : int
-        Number of times that the radius is searched along the worst azimuth alone. If the circle found still has a
-        worse azimuth, the whole circle is evaluated at each radius.
+        Largest number of searches for the radius along a single azimuth. If the phase difference on the circle with
+        the last radius found is still larger at another azimuth, the search continues with whole circles.
     probe_count : int
         Number of azimuths at which the exact difference of a large error is compared with the first-order difference.
     small_phase_rad, small_phase_fraction : float
-        Tolerance within which an error counts as small. It is the deviation of its exact phase difference from the
-        first-order difference. The larger of two values applies: this phase [rad], and this fraction of the largest
-        difference on the circle.
+        An error counts as small if its exact phase difference deviates from the first-order difference by at most the
+        larger of two values: this phase [rad], and this fraction of the largest difference on the circle.
     azimuth_rad : float
-        Tolerance δ of the azimuth of a largest difference. [rad] The difference varies as a cosine near its maximum,
-        so that a deviation of δ underestimates it by the fraction δ²/2.
+        Tolerance δ of the azimuth of a largest difference [rad]. The difference varies as a cosine near its maximum,
+        so that an azimuth error of δ makes it too small by the fraction δ²/2.
     folding_fraction : float
         Area ratio, see `ScenePhases.around`, below which the search also looks for places without an image.
     cases_per_block, lanes_per_block : int
-        Number of cases, and number of pairs of large error and place, in one block of a computation. The arrays of a
-        block fit into a processor's cache.
+        Number of cases, and number of pairs of a large error and a place, in one block of a computation. The arrays
+        of a block fit into a processor's cache.
     """
 
     rim_points: int = 16
@@ -126,13 +126,15 @@ SizeAt = Callable[[Floats, Indices], Floats]  # combined differences at radii (n
 class ScenePlaces:
     """Quadratic phases of errors at places, their combined difference from the scene centre, and the clearance.
 
-    `phases` (errors and parts, places) are the quadratic phases. [rad] `size` (places,) is the difference between the
-    phases at the place and at the centre, combined over all errors by the mission's rule. [rad]
+    `phases` (errors and parts, places) [rad] are the quadratic phases of all errors and of the independent parts of
+    which random errors are composed. `size` (places,) [rad] is the difference between the phases at the place and at
+    the centre, combined over all errors by the mission's rule.
 
-    A place has an image if its `clearance` (places,) exceeds 1. The clearance is the sine of the angle between the
-    directions that band and aperture resolve, divided by the smallest sine that gives an image. It is positive at the
-    centre. It is negative if the two directions are parallel at some point between the centre and the place. It is 0
-    at a place that almost coincides with a platform.
+    A place has an image if its `clearance` (places,) exceeds 1. The bandwidth gives one direction of resolution, and
+    the aperture gives a second direction. The clearance is the sine of the angle between these two directions,
+    divided by the smallest sine for which there is an image. It is positive at the centre. It is negative if the two
+    directions are parallel at some point between the centre and the place. It is 0 at a place that almost coincides
+    with a platform.
     """
 
     phases: Floats
@@ -155,11 +157,12 @@ class ScenePlaces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rims:
-    """Largest phase difference from the scene centre on each of several circles, with its azimuth. [rad]
+    """Largest phase difference from the scene centre on each of several circles, and its azimuth. [rad]
 
-    `difference` is the largest difference on each circle, and `azimuth` is where it occurs, (circles,) each. Both are
-    computed as if all errors were small. If a part of a circle has no image, its difference is infinite. `phases`
-    (errors and parts, points, circles) are the quadratic phases at evenly spaced points of the circles. [rad]
+    `difference` and `azimuth` are (circles,) each. Both are computed as if all errors were small, that is with
+    effects proportional to their sizes. If a part of a circle has no image, its difference is infinite. `phases`
+    (errors and parts, points, circles) [rad] are the quadratic phases at evenly spaced points of the circles, for all
+    errors and for the independent parts of which random errors are composed.
     """
 
     azimuth: Floats
@@ -175,9 +178,9 @@ Selection = int | Booleans | Indices | tuple[Indices, ...]  # of the cases
 
 
 class Heights(NamedTuple):
-    """Values found by a search along circles, and the azimuths where they occur. [rad]
+    """Values found by a search along circles, and the azimuths [rad] at which they occur.
 
-    The values are, for example, combined phase differences. If two values are equal, the value with the larger
+    The values are, for example, combined phase differences [rad]. If two values are equal, the value with the larger
     azimuth counts as higher.
     """
 
@@ -252,7 +255,10 @@ class ScenePhases:
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
     def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
-        """Compute the same result as `places` from the exact ranges at the places (`there`)."""
+        """Compute the phases and differences that `places` returns, from exact ranges that are already known.
+
+        `there` gives the exact ranges at the places, and `of` holds the index of the case for each place.
+        """
         centre = self.centre.take(of, axis=1)
         phases = self.random.there(there, of)
         if self.members:
@@ -268,9 +274,9 @@ class ScenePhases:
     def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
         """Combine the phases of several errors at each ground point by the mission's rule, (places,). [rad]
 
-        `phases` (errors and parts, places) are signed. `of` holds the index of the case for each place. `indices`
-        selects the errors to combine. If it is omitted, all errors are combined. The phases of a covariance are
-        combined according to their correlations.
+        `phases` (errors and parts, places) are signed; the parts are the independent parts of which random errors are
+        composed. `of` holds the index of the case for each place. `indices` selects the errors to combine. If it is
+        omitted, all errors are combined. The phases of a covariance are combined according to their correlations.
         """
         phases_of_errors = self.of_errors(phases)
         if indices is None and not self.groups:
@@ -283,32 +289,34 @@ class ScenePhases:
     def of_errors(self, phases: Floats) -> Floats:
         """Combine the parts of each random error, to give one phase for each error. [rad]
 
-        `phases` is (errors and parts, ...), and the result is (errors, ...). The phase of a random error is the sigma
-        that follows from its parts.
+        `phases` is (errors and parts, ...), and the result is (errors, ...). The phase of a random error is its
+        sigma, computed from the phases of its parts.
         """
         count = len(self.members)
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
-        """Phase difference of each error or part between ground points and the scene centre. [rad]
+        """Phase difference between ground points and the scene centre, for each error and part of an error. [rad]
 
-        The result is (errors and parts, places). The places are given by radius [m] and azimuth [rad] from the
-        centre. For a large error, whose effects are not proportional to its size, the result is the exact difference
-        for the worse sign of the error.
+        The result is (errors and parts, places). The parts are the independent parts of which random errors are
+        composed. `of` holds the index of the case for each place. The places are given by radius [m] and azimuth
+        [rad] from the centre. For a large error, whose effects are not proportional to its size, the result is the
+        exact difference for the worse sign of the error.
         """
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """Compute phase differences between ground points and the scene centre, and ratios that reveal a lost image.
+        """Compute phase differences between ground points and the scene centre, and ratios that show lost images.
 
-        Returns three arrays. The first, (errors and parts, places), holds the first-order phase differences. [rad]
-        The second, of the same shape, holds the same values, except that the differences of the errors marked in
-        `exact` are computed from exact ranges. [rad] `exact` is (errors and parts, places).
+        Returns three arrays. The first, (errors and parts, places), holds the first-order phase differences [rad].
+        The second [rad], of the same shape, holds the same values, except that the differences of the errors marked
+        in `exact` are computed from exact ranges. `exact` is (errors and parts, places). The parts are the
+        independent parts of which random errors are composed.
 
-        The third array, (places,), holds the smallest area ratio among the errors marked in `exact`. For each error,
-        the area ratio compares the areas spanned by the range and Doppler gradients with and without the error: it is
-        the area with the error, at the point to which the error moves the image, divided by the area without the
-        error. The ratio is 0 where there is no image. It is infinite where no error is marked.
+        The third array, (places,), holds the smallest area ratio among the errors marked in `exact`. The range and
+        Doppler gradients span an area. The area ratio of an error is the area with the error, at the point to which
+        the error moves the image, divided by the area without the error. The ratio is 0 where there is no image. It
+        is infinite where no error is marked.
         """
         there = self.ranges_at(radius, azimuth, of)
         small = self.there(there, of).phases - self.centre.take(of, axis=1)
@@ -347,18 +355,19 @@ class ScenePhases:
         """Index of the block of lanes in `_lanes` for each sign of each large error, (2, errors and parts).
 
         A lane is one error with one sign in one case. A block holds the lanes of all cases for one error with one
-        sign. The indices of errors that are large in no case have no meaning. An error is large if its effects are
-        not proportional to its size.
+        sign. An error is large if its effects are not proportional to its size. The indices of errors that are not
+        large in any case are meaningless.
         """
         lane = np.cumsum(self.is_large.any(axis=1)) - 1
         return np.array((2 * lane, 2 * lane + 1))
 
     @cached_property
     def _lanes(self) -> Lanes:
-        """Lanes of the errors that are large in at least one case, with both signs and in all cases.
+        """Lanes of the errors that are large in at least one case, for both signs and for all cases.
 
         A lane is one error with one sign in one case. The effects of a large error are not proportional to its
-        size."""
+        size.
+        """
         large = np.flatnonzero(self.is_large.any(axis=1))
         return self.errors.lanes(*(self.members[i] for i in large), signs=(1.0, -1.0))
 
@@ -398,9 +407,10 @@ class ScenePhases:
         """Find the largest phase difference from the scene centre on each circle, with first-order effects.
 
         Each circle is evaluated at evenly spaced points and searched near the points with the largest differences.
-        All circles must need the same number of evenly spaced points, see `points`. Where the clearance (see
-        `ScenePlaces`) has a small minimum, its surroundings are searched too. There the difference grows as the
-        inverse of the clearance, within an arc that the evenly spaced points may miss.
+        All circles must need the same number of evenly spaced points, see `points`. The difference grows as the
+        inverse of the clearance (see `ScenePlaces`). Near a small minimum of the clearance, it may therefore be
+        largest on a short arc between two of the points. For this reason the surroundings of such minima are searched
+        too.
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
@@ -438,17 +448,18 @@ def at(radius: PerCase, azimuth: PerCase) -> tuple[PerCase, PerCase]:
 
 # ---------------------------------------------------------------------- climbs
 def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[Heights, Heights]:
-    """Find the local minima of the clearance and the local maxima of the phase difference on circles.
+    """Search for the local minima of the clearance and the local maxima of the phase difference on circles.
 
     `heights` (2, points, circles) are the negative clearances and the sizes at evenly spaced points. The sizes are
-    combined phase differences, see `ScenePlaces`. `look` returns both at given azimuths of given circles. The
-    function returns the maxima of the negative clearances and the maxima of the sizes, (points, circles) each. A
+    combined phase differences, see `ScenePlaces`. `look` computes both quantities at given azimuths of given circles.
+    The function returns the maxima of the negative clearances and the maxima of the sizes, (points, circles) each. A
     value is minus infinity where no search started or where its result is not needed.
 
-    A search starts from each point whose value is at least as high as at both neighbours. Clearances that are not
-    expected to fall below `narrow_clearance_ratio` are left out. Sizes are left out if they are expected to stay
-    below the highest size, or if a point of their circle has no image. All remaining minima of the clearance are
-    searched, because the lowest minimum of a circle need not be next to the lowest of its points.
+    A search may start from each point whose value is at least as high as the values at both neighbours. A minimum of
+    the clearance is searched for if it is expected to lie below `narrow_clearance_ratio`. A maximum of the size is
+    searched for if it is expected to reach the highest size at the points of its circle, and if all these points have
+    an image. The clearance may need several searches on a circle, because its lowest minimum is not always next to
+    the point with the lowest clearance.
     """
     arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
@@ -481,8 +492,8 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
     `start` holds the values and azimuths of the starting points. `sides` are the values at an angle `arc` [rad] on
     both sides of each starting point. They do not exceed the value at the starting point. `height_at` computes values
     at given azimuths. To first order in the radius, a value is a constant plus a cosine of the azimuth. The search
-    predicts the crest of this cosine. If the value computed there differs from the prediction, the search is repeated
-    in a quarter of the arc.
+    predicts the crest of this cosine. If the value computed at the crest differs from the prediction, the search is
+    repeated on a quarter of the arc.
     """
     best, here, climbers = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(_SCENE.max_climb_rounds):
@@ -506,7 +517,7 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
 def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[Floats, Floats]:
     """Find the crest of the cosine through three points of a circle whose azimuths are `arc` [rad] apart.
 
-    Returns two arrays. The first is the azimuth of the crest minus that of the middle point, limited to ±`arc`. [rad]
+    Returns two arrays. The first is the azimuth of the crest relative to the middle point, limited to ±`arc` [rad].
     The second is the value at the crest.
     """
     sine = (after - before) / (2 * math.sin(arc))
@@ -518,8 +529,8 @@ def _crest(before: Floats, after: Floats, middle: Floats, arc: float) -> tuple[F
 class _Climb:
     """Search for the largest phase differences from the scene centre on circles, for errors of any size.
 
-    On each circle, the difference is first computed at evenly spaced azimuths, and at the azimuth where it is largest
-    for small errors. The search starts from the azimuth with the largest difference.
+    On each circle, the difference is first computed at evenly spaced azimuths, and at the azimuth where it would be
+    largest if all errors were small. The search starts from the azimuth with the largest difference.
     """
 
     def __init__(self, phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> None:
@@ -531,7 +542,7 @@ class _Climb:
         )  # negative area ratios and negative azimuths
 
     def largest(self) -> Heights:
-        """Find the largest phase difference from the scene centre on each circle, with its azimuth. [rad]
+        """Find the largest phase difference from the scene centre on each circle, and its azimuth. [rad]
 
         The difference is infinite if a part of the circle has no image.
         """
@@ -544,9 +555,9 @@ class _Climb:
     def _bent(self) -> Booleans:
         """Mark the large errors whose exact phase differences on a circle deviate from the first-order differences.
 
-        The result is (errors and parts, circles). An error is large if its effects are not proportional to its size.
-        The differences are compared at three azimuths. These suffice to detect a deviation that consists of two
-        harmonics of the azimuth.
+        The result is (errors and parts, circles), with the independent parts of which random errors are composed. An
+        error is large if its effects are not proportional to its size. The differences are compared at three
+        azimuths. These suffice to detect a deviation that consists of two harmonics of the azimuth.
         """
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
@@ -562,10 +573,10 @@ class _Climb:
         return np.asarray(is_bent.reshape(len(large), _SCENE.probe_count, -1).any(axis=1))
 
     def _look(self, circles: Indices, azimuths: Floats) -> Heights:
-        """Find the largest combined phase difference of each circle among given azimuths, with its azimuth. [rad]
+        """Find, for each circle, the largest combined phase difference among the given azimuths. [rad]
 
-        `azimuths` is (n, circles). The method also updates `lowest`, which holds the smallest area ratio found so far
-        on each circle, see `ScenePhases.around`.
+        `azimuths` is (n, circles). The result holds the difference and its azimuth. The method also updates `lowest`,
+        which holds the smallest area ratio found so far on each circle, see `ScenePhases.around`.
         """
         count = len(azimuths)
         of, bent = np.tile(self.of[circles], count), np.tile(self.bent[:, circles], count)
@@ -579,9 +590,9 @@ class _Climb:
     def _azimuths(self, circles: Indices) -> Floats:
         """Find the azimuth of the largest difference on each circle, or of a place without an image. [rad]
 
-        The effects of the errors marked in `bent` are computed by exact ranges. Where the range and Doppler gradients
-        are parallel, there is no image. Such places may lie on a short arc between the examined azimuths. The search
-        therefore also runs towards the azimuth where the gradients are nearest to parallel.
+        The effects of the errors marked in `bent` are computed from exact ranges. A place has no image if the range
+        and Doppler gradients are parallel. Such places may lie on a short arc between the examined azimuths. A second
+        search therefore runs towards the azimuth at which the gradients are nearest to parallel.
         """
         even = np.broadcast_to(2 * _ARC * np.arange(_SCENE.rim_points)[:, None], (_SCENE.rim_points, circles.size))
         top = self._look(circles, np.concatenate((self.rims.azimuth[circles][None], even)))
@@ -631,15 +642,16 @@ def differences_at(
 class SceneEdges:
     """Changes of the quadratic phases from the centres to the edges of the scenes, for many cases.
 
-    `phases` computes the phases at any ground point. `radius` (cases,) is the radius of the scene's edge. [m]
+    `phases` computes the phases at any ground point. `radius` (cases,) [m] is the radius of the scene's edge.
 
-    `rim` holds the largest phase difference from the centre, and its azimuth, as if all errors were small. [rad]
-    `largest` holds the same for the declared sizes of the errors. [rad] In both, the errors are combined by the
-    mission's rule. The differences are infinite if a part of the edge has no image.
+    `rim` holds the largest phase difference from the centre [rad] and the azimuth [rad] where it occurs, computed as
+    if all errors were small. `largest` holds the same two quantities, computed for the declared sizes of the errors.
+    In both, the errors are combined by the mission's rule. The differences are infinite if a part of the edge has no
+    image.
 
     `names` are the ids of the errors, or of the sums of errors, that are judged at the edge. `limit` (names, cases)
-    is the limit of each phase. [rad] `over` (names, cases) is the phase at the edge if it exceeds the limit although
-    the phase at the centre meets it. Otherwise it is 0. [rad]
+    [rad] is the limit of their phases. `over` (names, cases) [rad] is the phase at the edge if it exceeds the limit
+    although the phase at the centre meets it; otherwise it is 0.
     """
 
     phases: ScenePhases
@@ -678,7 +690,7 @@ def scene_edges(
     random : sequence of RandomError
         Random errors of the same missions. Errors without a declared size are ignored.
     limits : mapping of str to (cases,)
-        Limit of the quadratic phase of each owner, autofocus gain included. [rad] An owner is a platform, the clock
+        Limit of the quadratic phase of each owner, autofocus gain included [rad]. An owner is a platform, the clock
         or the whole mission.
     split : Shares
         Division of the budget. It determines which errors count against each limit.
@@ -742,18 +754,20 @@ def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> He
 def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
     """Combined phases that exceed their limits at the scene's edge but not at the centre. [rad]
 
-    The result is (names, n), for the n cases in `of`. An element is 0 if the phase meets its limit at the edge, or
-    exceeds it already at the centre. `members` holds, for each name, the indices of the errors that its phase
-    combines.
+    The result is (names, n), for the n cases in `of`. Each name is an error or a sum of errors that is judged at the
+    edge. An element is 0 if the phase meets its limit at the edge, or exceeds it already at the centre. `members`
+    holds, for each name, the indices of the errors that are combined.
     """
     phases, limit = edges.phases, edges.limit[:, of] * _LIMIT_FACTOR
     more = phases.more[:, of]
 
     def combined_phases(at_points: Floats) -> Floats:
-        """Phases that are compared with the limits, (names, ...). [rad]
+        """Return the phases that are compared with the limits, (names, ...). [rad]
 
         Under the rule `each` they are the magnitudes of the phases of single errors. Under the other rules they are
-        the combined phases of sums of errors. `at_points` is (errors and parts, ...)."""
+        the combined phases of sums of errors. `at_points` holds the phases of all errors, and of the independent
+        parts of which random errors are composed, (errors and parts, ...).
+        """
         if phases.combine == "each":
             return np.abs(phases.of_errors(at_points))
         return np.array([phases.together(at_points, of, indices) for indices in members])
@@ -772,7 +786,7 @@ def _over_at_the_edge(edges: SceneEdges, members: Sequence[Sequence[int]], of: I
 class Corrections:
     """Search for the distance from the scene centre within which a single autofocus correction is sufficient.
 
-    Within this distance, the combined phase difference from the centre stays within the budget `total`. [rad]
+    Within this distance, the combined phase difference from the centre stays within the budget `total` [rad].
 
     Attributes
     ----------
@@ -822,8 +836,9 @@ class Corrections:
     def _served_of_small(self, of: Indices) -> Floats:
         """Find the radii that `served` returns, with the effects of all errors taken to first order. [m]
 
-        The search runs along the worst azimuth at the scene's edge. It is repeated if the circle with the radius
-        found has a worse azimuth. After `max_azimuth_rounds` searches, the whole circle is evaluated at each radius.
+        The search runs along the azimuth with the largest phase difference at the scene's edge. If the circle with
+        the radius found has a larger difference at another azimuth, the search is repeated along that azimuth. After
+        `max_azimuth_rounds` searches, the whole circle is evaluated at each radius.
         """
         total, high, radii = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
         size, azimuth = self.edges.rim.of(of)
@@ -859,7 +874,7 @@ class Corrections:
     ) -> None:
         """Increase radii until the phase difference exceeds the budget `total`, or until `farthest` is reached.
 
-        `high` are these radii [m], and `size` are the phase differences at these radii [rad]. `low` and `below`
+        `high` are the radii [m], and `size` are the phase differences [rad] at these radii. `low` and `below`
         receive the previous radii and differences. All four arrays are updated in place. `size_at` computes the
         differences, and `searched` selects the cases."""
         total, farthest = self.total[of], self.farthest[of]
@@ -873,11 +888,11 @@ class Corrections:
             size[searched] = size_at(high[searched], searched)
 
     def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
-        """Find the largest phase difference from the scene centre on each circle, with its azimuth. [rad]
+        """Find the largest phase difference from the scene centre on each circle, and its azimuth. [rad]
 
         The circles have the given radii [m], and `of` holds the index of the case for each circle. If `of_small` is
-        true, the effects of all errors are taken to first order. Otherwise the effects of large errors are exact.
-        An error is large if its effects are not proportional to its size.
+        true, the effects of all errors are taken to first order. Otherwise the effects of large errors are exact. An
+        error is large if its effects are not proportional to its size.
         """
         largest, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
@@ -938,14 +953,14 @@ def where(
 
 # ---------------------------------------------------------------------- in words
 class SceneEdge(NamedTuple):
-    """Largest change of the quadratic phase from the centre to the edge of a mission's scene, with notes on it.
+    """Largest change of the quadratic phase from the centre to the edge of a mission's scene.
 
-    `radius` is the radius of the edge. [m] `difference` is the largest change of the phase, combined over all errors
-    by the mission's rule. [rad] It occurs at `azimuth` on the edge. [rad] `difference` is NaN if a part of the edge
+    `radius` [m] is the radius of the edge. `difference` [rad] is the largest change of the phase, combined over all
+    errors by the mission's rule. It occurs at `azimuth` [rad] on the edge. `difference` is NaN if a part of the edge
     has no image, and `degeneracy` then gives the reason.
 
-    Up to `autofocus_radius` the change stays within the total budget. [m] This radius is None if the change stays
-    within the budget up to `searched`, the largest radius that was examined. [m] `doubt` names an error or a sum of
+    Up to `autofocus_radius` [m] the change stays within the total budget. This radius is None if the change stays
+    within the budget up to `searched` [m], the largest radius that was examined. `doubt` names an error or a sum of
     errors that exceeds its limit at the edge, but not at the centre. `degeneracy` and `doubt` may be empty.
     """
 
@@ -986,7 +1001,7 @@ class SceneEdge(NamedTuple):
     def notes(self, total: float) -> tuple[Note, ...]:
         """Notes on the azimuth of the largest change and on the radius that one autofocus correction covers.
 
-        `total` is the total budget of the quadratic phase. [rad] If there is no change, a single note states this.
+        `total` [rad] is the total budget of the quadratic phase. If there is no change, a single note states this.
         """
         if not self.difference:
             return (phrases.note("same-at-the-edge"),)
@@ -1002,9 +1017,9 @@ class SceneEdge(NamedTuple):
 
 
 def _degeneracy(mission: Mission, ground_point: GroundVector) -> str:
-    """Text with the reason why a ground point has no image.
+    """Text that gives the reason why a ground point has no image.
 
-    `ground_point` is the point's position (east, north) relative to the scene centre. [m]
+    `ground_point` is the point's position (east, north) [m] relative to the scene centre.
     """
     (east, north), geometry = ground_point, mission.geometry
     transmitter, receiver = (

@@ -1,17 +1,18 @@
 """Quadratic phases of random errors at any ground point of a scene.
 
-The random errors are errors of sensors, clocks and air, and slow vibrations. Each is a sum of independent parts. The
-variation of a part over the aperture is known, while its size is random. A part is, for example, the bias along one
-axis, or one Legendre order of the noise along one axis. During a collection, a part has the same size for all ground
-points of the scene. The phases that a random error causes at two ground points therefore differ by the
+The random errors are errors of sensors, clocks and air, and slow vibrations. Each error is a sum of independent
+parts. The variation of a part over the aperture is known, while its size is random. A part is, for example, the bias
+along one axis, or one Legendre order of the noise along one axis. During a collection, a part has the same size for
+all ground points of the scene. The phases that a random error causes at two ground points therefore differ by the
 root-sum-square of the differences of its parts. Subtracting the root-sum-squares at the two points would
 underestimate this difference.
 
 - An error that moves a platform is projected on the line of sight from each ground point.
 - A clock error moves no platform. The constant and the linear term of its range error displace the image, and this
   displacement depends on the ground point. The phase at a ground point is therefore the phase at the centre plus a
-  phase due to these two terms. The two terms are computed from the displacement at the centre. Terms that the mission
-  file does not determine, as for a free oscillator, are left out. The report then contains a note on this.
+  phase due to these two terms. The two terms are computed from the displacement at the centre. If the mission file
+  does not determine a term, for example for a free-running oscillator, the term is left out, and the report contains
+  a note on this.
 - A zenith delay is the same for the whole scene, but the elevation of a platform depends on the ground point. A delay
   that changes within the aperture consists of as many independent parts as its correlation requires.
 - A slow vibration has an unknown phase. Its cosine and its sine are two parts of the same size. The effect in the
@@ -87,7 +88,7 @@ class RandomPhases:
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
     def of_errors(self, phases: Floats) -> Floats:
-        """Combine the phases of the parts of each error into the phase of the error. [rad]
+        """Combine the phases of the parts of each error to a single phase for each error. [rad]
 
         `phases` is (parts, ...), and the result is (errors, ...).
         """
@@ -102,7 +103,7 @@ class _Moving(NamedTuple):
     """Random error of the motion of one or both platforms.
 
     `moves` are the motions due to one unit of the error, and `size` is the size of the error in this unit. `groups`
-    is the number of groups into which the parts of the error are divided. The phases in a group are combined as a
+    is the number of groups into which the parts of the error are divided. The phases within a group are combined by
     root-sum-square, and the results of all groups are added.
     """
 
@@ -130,10 +131,10 @@ class _Moving(NamedTuple):
 class _Clock(NamedTuple):
     """Clock error, divided into independent parts.
 
-    `quadratic` is the quadratic phase at the scene centre due to each part. [rad] `constant` [m] and `linear` [m/s]
+    `quadratic` [rad] is the quadratic phase at the scene centre due to each part. `constant` [m] and `linear` [m/s]
     are the constant and the linear term of the range error due to each part. These three arrays are (parts, cases).
-    `at_centre` (2, cases) is the quadratic phase at the centre due to a constant term of 1 m, and due to a linear
-    term of 1 m/s. [rad]
+    `at_centre` (2, cases) [rad] is the quadratic phase at the centre due to a constant term of 1 m, and due to a
+    linear term of 1 m/s.
     """
 
     quadratic: Floats
@@ -181,8 +182,8 @@ def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
 class _Delay(NamedTuple):
     """Error of the propagation delay in air, on the path between the scene and one or both platforms.
 
-    `delay` is the kind of delay, and `metres` is its size at the zenith. [m] `middles` are the positions of the
-    platforms at mid-aperture relative to the scene centre. [m] `courses` (courses, nodes, cases) are independent
+    `delay` is the kind of delay, and `metres` [m] is its size at the zenith. `middles` [m] are the positions of the
+    platforms at mid-aperture relative to the scene centre. `courses` (courses, nodes, cases) are independent
     variations over the aperture. If each is multiplied by an independent random number of variance 1, their sum is a
     zenith delay of variance 1.
     """
@@ -253,9 +254,9 @@ def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
-    """Matrix (count, sensed) that interpolates values at `sensed` quadrature nodes of the aperture to `count` nodes.
+    """Matrix (count, sensed) that interpolates values from `sensed` to `count` quadrature nodes of the aperture.
 
-    The interpolation uses the Legendre polynomials up to the highest order that both sets of nodes resolve.
+    The interpolation uses the Legendre polynomials up to the highest order that both sets of nodes can represent.
     """
     node_times, weights = np.polynomial.legendre.leggauss(sensed)
     order = np.arange(min(sensed, count))

@@ -42,7 +42,7 @@ class Tone(NamedTuple):
     """Sinusoidal phase error due to a platform's vibration, an oscillator's spur, or an oscillator's vibration.
 
     `phase` is the peak phase [rad], and `cycles` is the number of cycles per aperture. `in_quadrature` is the row id
-    of a second tone that is shifted by a quarter cycle relative to this tone. If it is None, the tone may have any
+    of another tone, relative to which this tone is shifted by a quarter cycle. If it is None, the tone may have any
     phase.
     """
 
@@ -66,13 +66,13 @@ class SpreadPhase(NamedTuple):
 
 
 class StatedPower(NamedTuple):
-    """Error that was determined elsewhere, stated in the mission file as a contribution to the ISLR. [dB]"""
+    """Error for which the mission file states a contribution to the ISLR [dB], as determined by the user."""
 
     subject: Subject
     islr: Any
 
     def rms(self, model: str, energy: float) -> Any:
-        """Rms phase of noise that would add the stated ISLR. [rad]
+        """Rms phase of the noise that would add the stated ISLR. [rad]
 
         For the parameters `model` and `energy` see `spread_phase`.
         """
@@ -88,7 +88,7 @@ def mainlobe_energy(mission: Mission) -> float:
 
 
 def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
-    """Rms phase of noise that adds a given ISLR. [rad]
+    """Rms phase of the noise that adds a given ISLR. [rad]
 
     This is the inverse of `islr_db`.
 
@@ -97,8 +97,8 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
     ratio : float or array
         ISLR as a power ratio.
     model : str
-        With `published` the ISLR is σ², by the paper's rule. Otherwise it is (exp(σ²) - 1)/E, as in an image. σ² is
-        the variance of the phase.
+        `published` or `full`. With σ² as the variance of the phase, the ISLR is σ² in the published model, according
+        to the paper's rule, and (exp(σ²) - 1)/E in the full model, as in an image.
     energy : float
         Fraction E of the response's energy within the first nulls, see `mainlobe_energy`.
     """
@@ -108,8 +108,8 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
 def islr_db(variance: PerCase, model: str, energy: float) -> Any:
     """ISLR that noise with a given phase variance adds. [dB]
 
-    The variance σ² [rad²] must be above 0. In the published model the ISLR is σ², by the paper's rule. Otherwise it
-    is (exp(σ²) - 1)/E, as in an image. `energy` is the fraction E of `mainlobe_energy`.
+    The variance σ² [rad²] must be above 0. In the published model the ISLR is σ², according to the paper's rule. In
+    the full model it is (exp(σ²) - 1)/E, as in an image. `energy` is the fraction E, see `mainlobe_energy`.
     """
     if model == "published":
         return 10 * np.log10(variance)
@@ -127,10 +127,10 @@ def islr_of(mission: Mission, variance: PerCase) -> Floats:
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
-    """Largest rms phase of noise with which an owner stays within its share of the required ISLR. [rad]
+    """Largest rms noise phase with which an owner stays within its share of the required ISLR. [rad]
 
-    In the published model the limit follows from the paper's rule, otherwise from the ISLR in an image. The result is
-    None if the mission has no requirement on ISLR.
+    An owner is a platform, the clock or the mission. In the published model the limit follows from the paper's rule,
+    otherwise from the ISLR in an image. The result is None if the mission has no requirement on ISLR.
     """
     if mission.requirements.islr is None:
         return None
@@ -170,12 +170,13 @@ def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[To
 
 
 def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """List the tones that remain of an oscillator's tone after synchronization and make echoes.
+    """List the tones with echoes that remain after synchronization has acted on a tone of an oscillator.
 
-    `alone` is the oscillator's tone, represented by a single tone. If synchronization does not fold it, the list has
-    only this tone. If synchronization folds it to several frequencies, the list has a tone for each of them. Without
-    a requirement on PSLR, a folded tone is listed as a single tone instead, with its total power at the frequency of
-    the largest echo. `free` is the peak phase without synchronization. [rad]
+    `alone` represents the result of synchronization as a single tone. If synchronization does not fold the
+    oscillator's tone to other frequencies, the list contains only `alone`. If synchronization folds it to several
+    frequencies, the list has a tone for each of them. Without a requirement on PSLR, a folded tone is listed as a
+    single tone instead, which has the total power at the frequency of the largest echo. `free` [rad] is the peak
+    phase of the oscillator's tone without synchronization.
     """
     if not remaining.is_folded:
         return [alone]
@@ -195,8 +196,8 @@ def noise(
 ) -> list[SpreadPhase]:
     """List the phase errors due to noise, which spread energy over the image, with their variances. [rad²]
 
-    Their origins are wideband vibration, the random errors `random`, and ISLR contributions that the mission file
-    states. Random errors are sensor noise, phase noise and synchronization links.
+    They are due to wideband vibration, to the random errors `random`, and to errors whose ISLR contribution the
+    mission file states. The random errors are sensor noise, phase noise and the noise of synchronization links.
     """
     spreads = []
     for name in PLATFORMS:
@@ -224,8 +225,9 @@ def rests(
 
     The errors are errors of motion, clocks and sensors, and slow vibrations. The variances are at one sigma, without
     coverage factor. Negligible phases are left out. The phases are very small for short apertures, and larger for an
-    aperture of a quarter of a circle. They follow from the full model. Where a line of sight turns by more than a
-    radian, these parts are left out, because the quadratic phase of equal peak loss already contains them.
+    aperture of a quarter of a circle. They are computed with the full model. Where a line of sight turns by more than
+    a radian, they are left out. In this case the quadratic phase is defined as the phase that lowers the peak as much
+    as the whole error does, so it already includes them.
 
     Parameters
     ----------
@@ -261,7 +263,7 @@ def rests(
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
-    """List the errors determined elsewhere, which the mission file states as contributions to the ISLR."""
+    """List the errors for which the file states a contribution to the ISLR, as determined by the user."""
     return [
         StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
         for index, stated in enumerate(mission.other_errors)
@@ -272,9 +274,9 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
     """List, for each owner, the phase errors that count against its share of the ISLR.
 
-    For the owner `mission`, these are the phase errors of all owners. The phase errors are noise, and the parts of
-    phases beyond the cubic order. Tones are included if there is no requirement on PSLR. The cubic phase is included
-    if it has no requirement of its own. This cubic phase combines the errors of the owner at one sigma. It is left
+    An owner is a platform, the clock or `mission`, which means all owners together. The phase errors are noise and
+    the parts of phases beyond the cubic order. Tones are included if there is no requirement on PSLR. The cubic
+    phase, combined over the owner's errors at one sigma, is included if it has no requirement of its own. It is left
     out where it is negligible, or where an error is so large that there is no image. A variance [rad²] is NaN in the
     cases in which the phase error is left out or does not occur.
     """
@@ -298,6 +300,10 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
 
 
 def declared_powers(analysis: "Analysis", owner: str, model: str) -> list[SpreadPhase]:
-    """List the phase errors that count against an owner's share of the ISLR, for a single case, in plain numbers."""
+    """List the phase errors that count against an owner's share of the ISLR, for a single case.
+
+    The errors are given as single numbers instead of arrays. `owner` is a platform, the clock or `mission`, and
+    `model` is `published` or `full`.
+    """
     (powers,) = powers_held_by_islr(analysis, [owner], model)
     return [power._replace(variance=float(np.ravel(power.variance)[0])) for power in powers]

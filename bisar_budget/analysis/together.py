@@ -1,6 +1,7 @@
 """Combination of the phases and displacements that a mission's declared errors cause, for many cases at once.
 
-The errors may be combined for the whole mission, or for an owner of a share: transmitter, receiver or clock.
+The errors may be combined for the whole mission, or for an owner of a share of the budget: transmitter, receiver or
+clock.
 """
 
 import math
@@ -57,10 +58,10 @@ class Together:
         Phases of all declared errors. They are errors of motion, errors of clocks, pure phase errors, and the errors
         in `own`.
     undirected_moves : list of (str, (east, north))
-        Displacements of the image by random errors and tones, whose displacements have no sign. [m] Each item is a
-        pair of row id and displacement. For a random error these are the sigmas of the displacement. For a tone, each
-        component is given for the phase of the tone at which it is largest. The displacement is 0 for a clock whose
-        displacement the mission file does not determine.
+        Displacements of the image [m] due to random errors and tones, which have no sign. Each item is a pair of row
+        id and displacement. For a random error, the displacement is given by its sigmas. For a tone, each component
+        is given for the phase of the tone at which it is largest. The displacement is 0 for a clock error if the
+        mission file does not determine the displacement.
     """
 
     def __init__(
@@ -83,9 +84,9 @@ class Together:
 
     @property
     def rule_of_all(self) -> str:
-        """Rule for sums that must include all declared errors.
+        """Rule for combinations that must include all declared errors.
 
-        It is the mission's rule. If that is `each`, which forms no sums, it is `rss`, the root-sum-square.
+        It is the mission's rule. If that rule is `each`, which combines no errors, it is `rss`, the root-sum-square.
         """
         return "rss" if self.rule == "each" else self.rule
 
@@ -119,7 +120,7 @@ class Together:
             yield phase._replace(hidden_rad=does.hidden)
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
-        """List the phases of the declared errors that count against an owner's share.
+        """List the phases of the declared errors that count against an owner's share of the budget.
 
         `owner` is a platform, the clock or `mission`. For `mission`, all phases are returned. `split` decides whether
         the errors of the clock count against the receiver's share.
@@ -129,10 +130,10 @@ class Together:
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: PerCase | None = None) -> Phases:
         """List the judged phases that a rule combines, as pairs of id and phase. [rad]
 
-        The judged phase is the root-sum-square of the quadratic phase and `gain` times the hidden phase. Autofocus
-        does not correct the hidden phase. If `rule` or the autofocus gain `gain` is not given, the mission's value is
-        used. Under root-sum-square the six phases of a covariance are combined to a single phase, according to their
-        correlations.
+        The judged phase is the root-sum-square of two phases: the quadratic phase, and the hidden phase times `gain`,
+        the autofocus gain. The hidden phase is the quadratic phase that would lower the peak as much as the part of
+        the error that autofocus does not correct. If `rule` or `gain` is not given, the mission's value is used.
+        Under root-sum-square, the six correlated phases of a declared covariance are combined to a single phase.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
         row_ids = [member.row_id for member in members]
@@ -159,8 +160,8 @@ class Together:
     def _hidden_by_group(self) -> dict[str, Any]:
         """Compute the combined hidden phase of the six errors of each covariance. [rad]
 
-        The keys are the ids of the covariances. Autofocus does not correct hidden phases. In the published model they
-        are 0."""
+        The keys are the ids of the covariances. The hidden phase is the quadratic phase that would lower the peak as
+        much as the part of an error that autofocus does not correct. In the published model it is 0."""
         if self.model == "published":
             return {group.id: 0.0 for group in self.groups}
         stated = {error.subject.id for error in self.motion}
@@ -169,7 +170,9 @@ class Together:
     def _hidden_of(self, group: Correlated) -> Floats:
         """Combined hidden phase of the six errors of a covariance, (cases,). [rad]
 
-        It is the root-sum-square of the hidden phases of six independent errors with the same covariance.
+        The hidden phase of an error is the quadratic phase that would lower the peak as much as the part of the error
+        that autofocus does not correct. The six correlated errors are replaced by six independent errors that
+        together have the same covariance. The result is the root-sum-square of the hidden phases of these errors.
         """
         errors = {error.subject.id: error for error in self.motion}
         remaining = []
@@ -182,8 +185,8 @@ class Together:
     def independent(self, group: Correlated, remaining: Floats) -> Floats:
         """Range errors due to six independent errors that together have the covariance of six correlated errors. [m]
 
-        The result is (6, nodes, cases). `remaining` are the range errors at the nodes due to the six correlated
-        errors, (6, nodes, cases). [m] They are multiplied by a factor F of the correlation matrix C, with FFᵀ = C.
+        The result is (6, nodes, cases). `remaining` [m] are the range errors at the nodes due to the six correlated
+        errors, (6, nodes, cases). They are multiplied by a factor F of the correlation matrix C, where FFᵀ = C.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
         return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
@@ -198,7 +201,8 @@ class Together:
     def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
         """List the cubic phases of the errors that count against an owner's share, without the coverage factor. [rad]
 
-        The phases are signed. Each item is a pair of row id and phase. Errors without a cubic phase are left out.
+        `owner` is a platform, the clock or `mission`, and `split` divides the budget between them. The phases are
+        signed. Each item is a pair of row id and phase. Errors without a cubic phase are left out.
         """
         members = self.owed(split, owner)
         return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
@@ -206,21 +210,22 @@ class Together:
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
         """Combined cubic phase of the errors that count against an owner's share, without the coverage factor. [rad]
 
-        The phases are added under `combine: sum`. Under the other rules they are combined as a root-sum-square, since
-        powers add. The result is (cases,).
+        `owner` is a platform, the clock or `mission`, and `split` divides the budget between them. The phases are
+        added under `combine: sum`. Under the other rules they are combined as a root-sum-square, since powers add.
+        The result is (cases,).
         """
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
-        """List the displacements of the image by errors of motion, in the form that a rule needs. [m]
+        """List the displacements of the image due to errors of motion, in the form that a rule combines. [m]
 
-        Each item is a pair of row id and (east, north). Under all rules except `sum`, the displacement is given for
-        the sign of the error that moves the image farther.
+        Each item is a pair of row id and (east, north). For all rules except `sum`, the displacement is given for the
+        sign of the error that moves the image farther.
 
-        The rule `sum` takes the largest sum over all combinations of signs. The displacements for the two signs of an
-        error are split into a mean and a deviation from it. The deviation reverses with the sign, and it is the item
-        of the error. The means do not depend on the signs. Their sum over all errors is an additional item, unless it
-        is 0.
+        The rule `sum` takes the largest sum over all combinations of signs. For this rule, the displacements for the
+        two signs of an error are split into their mean and a deviation that reverses with the sign. The item
+        of an error holds the deviation. The means do not depend on the signs. If their sum over all errors is
+        not 0, this sum is an additional item.
         """
         if rule != "sum":
             return [(error.subject.id, self.errors.farthest(self.model, error)) for error in self.motion]
@@ -253,14 +258,15 @@ class Together:
 
     @property
     def is_placed(self) -> bool:
-        """Whether any declared error can displace the image."""
+        """Whether at least one declared error can displace the image."""
         return bool(self.motion or self.undirected_moves)
 
     def moved(self, rule: str) -> Floats:
-        """Length of the displacement of the image by all declared errors, combined by a rule, (cases,). [m]
+        """Length of the displacement of the image due to all declared errors, combined by a rule, (cases,). [m]
 
-        The displacement by a random error or a tone has no sign. Under `sum` its length is added to the largest sum
-        of the displacements by errors of motion. The result is NaN where an error leaves no image.
+        The displacement due to a random error or a tone has no sign. Under `sum`, the length of such a displacement
+        is added to the largest sum of the displacements due to errors of motion. The result is NaN where an error
+        leaves no image.
         """
         if rule != "sum":
             moves = [*self.moves(rule), *self.undirected_moves]
@@ -270,7 +276,7 @@ class Together:
 
     # ---------------------------------------------------------------- one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
-        """List the signed phases that a rule combines in one case, in plain numbers. [rad]
+        """List the signed phases that a rule combines in one case, as floats. [rad]
 
         Each item is a pair of id and phase. If `rule` is empty, it is the mission's rule. Under root-sum-square the
         six phases of a covariance are combined to a single item.
@@ -279,7 +285,7 @@ class Together:
         return [(row_id, plain(phase, case)) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
-        """List the displacements of the image that the mission's rule combines in one case, in plain numbers. [m]
+        """List the displacements of the image that the mission's rule combines in one case, as floats. [m]
 
         Each item is a pair of id and (east, north). The list is empty if an error leaves no image. Under
         root-sum-square the six displacements of a covariance are combined to a single item.

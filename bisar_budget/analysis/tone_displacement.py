@@ -2,14 +2,15 @@
 
 Over an aperture of duration T, a tone of frequency f and amplitude A has the mean A·j₀(x), with x = πfT. Its linear
 part is 3A·j₁(x) at the aperture edge. These parts of the range error displace the image. In the published model the
-displacement follows from (25). In the full model, whose line of sight turns, it follows from the Legendre orders 0 to
-3 of the tone with exact ranges. Orders 0 and 2 are largest at the same phase of the tone, and orders 1 and 3 are
-largest a quarter cycle later. The image therefore moves on an ellipse as the phase of the tone varies.
+displacement follows from equation (25) of the paper. In the full model the line of sight turns. The displacement then
+follows from exact ranges, and from the Legendre terms of order 0 to 3 of the tone. Terms 0 and 2 are largest at the
+same phase of the tone, and terms 1 and 3 are largest a quarter cycle later. The image therefore moves on an ellipse
+as the phase of the tone varies.
 
 The east and the north component are each taken at the phase at which they are largest. Their root-sum-square is √2
 times the rms displacement over all phases. It lies between the largest displacement and √2 times the largest
-displacement. Derived here, to first order in the amplitude. `tests/analysis/test_tone_displacement.py` checks it
-against exact ranges for all phases.
+displacement. These relations are derived here, to first order in the amplitude.
+`tests/analysis/test_tone_displacement.py` checks them against exact ranges for all phases.
 
 The vibrations along the axes may have any phase relative to each other, so their displacements add. The displacement
 decreases with the frequency of the tone, as 1/(fT).
@@ -37,11 +38,12 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):
-    """Part of a tone that has a single direction and a single frequency, with the displacement that it causes.
+    """Part of a tone with a single direction and a single frequency, and the displacement that this part causes.
 
-    `orders` (4, n) are the signed amplitudes of its Legendre orders 0 to 3 at the aperture edge. [m] `per_metre`
-    (4, 2, n) is the displacement of the image, east and north, per metre of each order. [m/m] The last axis holds n
-    cases.
+    Over the aperture, the part is expanded in Legendre polynomials of order 0 to 3. `orders` (4, n) [m] are the
+    signed amplitudes of these four terms; the amplitude of a term is its value at the aperture edge. `per_metre`
+    (4, 2, n) [m/m] is the displacement of the image, east and north, per metre of amplitude of each term. The last
+    axis holds n cases.
     """
 
     orders: Floats
@@ -57,8 +59,8 @@ class TonePart(NamedTuple):
 class ToneDisplacement(NamedTuple):
     """Displacement of the image by a tone in both models.
 
-    `subject` is the subject of the tone's row. `published` and `full` are the parts of the tone in each model, such
-    as a part for each axis of a vibration. The parts may be in any phase relative to each other.
+    `subject` identifies the tone's row in the report. `published` and `full` are the parts of the tone in each model,
+    for example one part for each axis of a vibration. The parts may have any phase relative to each other.
     """
 
     subject: Subject
@@ -66,25 +68,25 @@ class ToneDisplacement(NamedTuple):
     full: Sequence[TonePart]
 
     def parts(self, model: str) -> Sequence[TonePart]:
-        """Return the parts of the tone according to `model`, `published` or `full`."""
+        """Return the parts of the tone in the model `published` or `full`."""
         return self.full if model == "full" else self.published
 
     def by(self, model: str) -> Floats:
-        """Displacement of the image east and north according to `model`, `published` or `full`, (2, n). [m]
+        """Displacement of the image east and north in the model `published` or `full`, (2, n). [m]
 
-        Each component is given for the phase of the tone at which it is largest. The displacements by all parts of
-        the tone are added.
+        Each component is given for the phase of the tone at which it is largest. The displacements due to all parts
+        of the tone are added.
         """
         return np.asarray(sum(tone_part.displacement for tone_part in self.parts(model)))
 
 
 def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
-    """List the displacements of the image by vibrations of platforms and by tones of oscillators.
+    """List the displacements of the image due to vibrations of platforms and tones of oscillators.
 
     Vibrations of platforms are included at any frequency. If the exchanges of a synchronization link fold an
-    oscillator's tone, the tone has a part at each resulting frequency. Two effects below one cycle per aperture are
-    not included, because they are in separate rows. The effect of an oscillator's vibration is in the row of the
-    oscillator's acceleration. The effect of a folded tone is in the row of the oscillator.
+    oscillator's tone, the tone has a part at each resulting frequency. Two effects at frequencies below one cycle per
+    aperture are not included, because separate rows contain them. The row of the oscillator's acceleration contains
+    the effect of an oscillator's vibration, and the row of the oscillator contains the effect of a folded tone.
     """
     T, plane, displacements = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
     for platform_index, name in enumerate(PLATFORMS):
@@ -124,8 +126,8 @@ def _tones_of_oscillators(
 ) -> Iterator[tuple[Subject, PerCase, LeftTone]]:
     """Yield the tones of the oscillators, which are their spurs and the tones that vibration causes.
 
-    Each item has three elements. They are the subject of the tone's row, the peak phase of the tone without
-    synchronization [rad], and the tones that remain after synchronization. The phase is 0 for a vibration below one
+    Each item has three elements: the subject of the tone's row in the report, the peak phase of the tone without
+    synchronization [rad], and the tones that are left after synchronization. The phase is 0 for a vibration below one
     cycle per aperture whose tone is not folded.
     """
     for spur in spurs_of(mission, geometry):
@@ -139,16 +141,17 @@ def _tones_of_oscillators(
 
 
 def _orders(cycles: PerCase, size: PerCase) -> Floats:
-    """Signed amplitudes of the Legendre orders 0 to 3 of a tone at the aperture edge, (4, n). [m]
+    """Signed amplitudes of the Legendre terms of order 0 to 3 of a tone, (4, n). [m]
 
-    `cycles` is the number of cycles per aperture, and `size` is the amplitude of the tone. [m]
+    The amplitude of a term is its value at the aperture edge. `cycles` is the number of cycles per aperture, and
+    `size` [m] is the amplitude of the tone.
     """
     quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
     return np.array([constant, linear, quadratic, cubic])
 
 
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
-    """Displacement of the image, east and north, per metre of each Legendre order, according to (25). [m/m]
+    """Displacement of the image, east and north, per metre of each Legendre term, from equation (25). [m/m]
 
     The result is (4, 2, n). It is 0 for orders 2 and 3. For orders 0 and 1 it is NaN where the matrix Q is singular.
     """
@@ -161,9 +164,10 @@ def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
 
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
-    """Displacement of the image, east and north, per metre of each Legendre order, by exact ranges. [m/m]
+    """Displacement of the image, east and north, per metre of each Legendre term, from exact ranges. [m/m]
 
-    The result is (4, 2, n). `along` (nodes, n) is the range error at the nodes per metre of the tone's motion. [m/m]
+    The result is (4, 2, n). `along` (nodes, n) [m/m] is the range error at the aperture nodes per metre of the tone's
+    motion.
     """
     seen = np.where(np.abs(along) > VECTOR_ROUNDING_FRACTION, along, 0.0)
     return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))

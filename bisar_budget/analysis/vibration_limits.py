@@ -4,16 +4,18 @@ The limits follow from the paper's rule, and separately from first principles. A
 of sight causes a phase with the peak φ = 2πA/λ. A sinusoidal motion makes paired echoes. Their amplitude relative to
 the impulse response is J₁(φ)/J₀(φ), about φ/2. Gaussian noise with the rms phase σ leaves the fraction exp(-σ²) of
 the power in the response and spreads the remaining power. An image then shows an ISLR of (exp(σ²) - 1)/E, see
-`spread`. Derived here, and checked against the transform of the phase.
+`spread`. These relations are derived here. They were checked against the Fourier transform of an error-affected
+aperture phase.
 
-The requirement is divided between the platforms. If each platform stays within its share, both together must meet the
-requirement. If both vibrate at the same frequency, the amplitudes of their echoes add in the worst phase. The
-allowable amplitude is therefore divided, in the ratio of the roots of the shares of power. Noise is independent from
-platform to platform, so variances add and the allowable power is divided.
+The requirement is divided between the platforms so that both together meet it if each stays within its share. If both
+vibrate at the same frequency, the amplitudes of their echoes add in the worst phase. The allowable amplitude is
+therefore divided, in the ratio of the square roots of the platforms' shares of the allowed power. The noise of the
+two platforms is independent, so its variances add, and the allowed power itself is divided.
 
 The paper's rule is φ² ≤ PSLR·share and σ² ≤ ISLR·share. At equal shares, its limit for sinusoids is 3 dB below the
-limit from first principles. Its limit for noise exceeds the limit from first principles by 1/E, which is 0.44 dB with
-a uniform window. If both platforms had the same noise instead of independent noise, this would add 3 dB.
+limit from first principles. Its limit for noise exceeds the limit from first principles by the factor 1/E, which is
+0.44 dB with a uniform window. If the noise were identical on both platforms instead of independent, the ISLR would be
+3 dB higher.
 
 A vibration between one and three cycles per aperture counts as a vibration that makes echoes, although it also causes
 a quadratic phase. A slower vibration makes no echoes, see `effects.vibration`.
@@ -45,23 +47,24 @@ _motion_of_phase: Callable[..., PerCase] = evaluators.motion_of_phase
 class VibrationLimits(NamedTuple):
     """Largest allowed vibration of a platform along the line of sight, as an amplitude or an rms value. [m]
 
-    The limit `published` follows the paper's rule, and `full` follows from first principles. Amplitudes
-    are measured from 0 to peak.
+    The limit `published` follows the paper's rule, and `full` is derived from first principles. Amplitudes are
+    measured from 0 to peak.
     """
 
     published: Any
     full: Any
 
     def by(self, model: str) -> Any:
-        """Return the limit according to a gating model, `published`, `full` or `strictest`. [m]
+        """Return the limit for a choice of the gating model: `published`, `full` or `strictest`. [m]
 
-        Under `strictest` it is the smaller of the two limits.
+        The gating model is the model that decides the verdict. Under `strictest` the limit is the smaller of the two
+        limits.
         """
         return np.minimum(*self) if model == "strictest" else self.full if model == "full" else self.published
 
     @property
     def margin_db(self) -> Any:
-        """Ratio of the limit from first principles to the limit by the paper's rule. [dB]"""
+        """Ratio of the limit derived from first principles to the limit from the paper's rule. [dB]"""
         return 20 * np.log10(self.full / self.published)
 
 
@@ -88,11 +91,11 @@ def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
 
 
 class Echo(NamedTuple):
-    """Paired echo of a single tone, or of tones with neighbouring frequencies in their worst phases.
+    """Paired echo of a single tone, or of several tones with neighbouring frequencies and the worst phases.
 
-    `phase` is the peak phase of a single tone with an equally high echo. [rad] `cycles` is the number of cycles per
-    aperture, which is also the distance of the echo from the main response in resolution cells. `level` is the
-    amplitude of the echo relative to the main response. `is_of` (tones, ...) marks the tones that make the echo.
+    `phase` [rad] is the peak phase of a single tone that would make an equally high echo. `cycles` is the number of
+    cycles per aperture, which is also the distance of the echo from the main response in resolution cells. `level` is
+    the amplitude of the echo relative to the main response. `is_of` (tones, ...) marks the tones that make the echo.
     """
 
     phase: Any
@@ -218,7 +221,8 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
 def amplitude_share(split: Shares, name: str) -> PerCase:
     """Share of a platform in the allowed amplitude of paired echoes.
 
-    The shares of both platforms sum to 1. They are in the ratio of the roots of the shares of power in `split`.
+    The shares of both platforms sum to 1. Their ratio is the square root of the ratio of the shares of power in
+    `split`. `name` is the name of the platform.
     """
     share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
     return evaluators.amplitude_share(share, share_of_other)

@@ -1,4 +1,4 @@
-"""Judges an analysed mission: budget rows for single errors and for sums of errors, requirements, and waivers.
+"""Judgement of an analysed mission: budget rows for single errors and for sums of errors, requirements, and waivers.
 
 Many mission files can be checked together.
 """

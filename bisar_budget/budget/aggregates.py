@@ -51,9 +51,10 @@ class Aggregates:
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
-        """Yield all rows for sums of errors under one gating model, in the order of the JSON output.
+        """Yield all rows for sums of errors, as judged by one model, in the order of the JSON output.
 
-        A row that passes under the gating model becomes a warning if it exceeds its limit under the non-gating model.
+        `model` is `published` or `full`. A row that passes in this model becomes a warning if it exceeds its limit in
+        the other model.
         """
         mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
@@ -95,7 +96,8 @@ class Aggregates:
         """Build the warning row for the mission's total quadratic phase under `combine: each`.
 
         The rule `each` judges every error alone. The row exists only in the cases in which no single error exceeds
-        the limit, but the root-sum-square of all errors does.
+        the limit, but the root-sum-square of all errors does. `mine` holds the errors in the model that judges the
+        row, and `theirs` the errors in the other model.
         """
         row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
@@ -153,11 +155,14 @@ class Aggregates:
         )
 
     def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
-        """List the random errors (sensors, clocks, atmosphere) that count against the share of `owner`."""
+        """List the random errors (sensors, clocks, atmosphere) that count against the share of an owner.
+
+        `owner` is a platform, the clock or `mission`, and `split` divides the budget between them.
+        """
         return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Booleans:
-        """Return a mask of the cases in which any of the phases `members` is declared, (cases,)."""
+        """Return a mask of the cases in which at least one of the phases `members` is declared, (cases,)."""
         is_declared = np.zeros(self.judging.cases, dtype=bool)
         for member in members:
             is_declared |= member.is_there
@@ -182,10 +187,11 @@ class Aggregates:
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
 
-        A declared sum without a finite value fails, because an error in it leaves no image of the point.
-        `without_value` replaces the status `fail` of such a sum. `continued` is a pair: the kind of effect that the
-        row sums, and the random errors in the sum. A pass becomes a warning if it depends on phase noise below the
-        first point of a mask. A pass that depends on doubtful oscillator noise becomes `not_evaluated`.
+        A declared sum without a finite value fails, because one of its errors is so large that no image of the point
+        forms. If the argument `without_value` is given, it is the status of such a sum instead of `fail`. `continued`
+        is a pair: the kind of effect that the row sums, and the random errors in the sum. A pass becomes a warning if
+        it depends on phase noise at frequencies below the first point of a phase-noise mask. A pass that depends on
+        doubtful oscillator noise becomes `not_evaluated`.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -227,9 +233,9 @@ class Aggregate(FamilyRow):
     """The budget row for one sum of errors, judged by one model, for an array of cases.
 
     `rule` names the rule that combines the `phases`. A row of displacements has no phases. `by_other` is the sum
-    under the non-gating model. Under `combine: each` the row holds the largest error instead of a sum. `of_all` is
-    then the root-sum-square of all errors; otherwise it is NaN. A pass becomes a warning if `by_other` or `of_all`
-    exceeds the limit.
+    according to the model that does not judge the row. Under `combine: each` the row holds the largest error instead
+    of a sum, and `of_all` is the root-sum-square of all errors; under any other rule `of_all` is NaN. A pass becomes
+    a warning if `by_other` or `of_all` exceeds the limit.
     """
 
     rule: str
@@ -246,10 +252,11 @@ class Aggregate(FamilyRow):
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
         """Return the row with the equal-loss phase as its declared value, instead of the judged phase.
 
-        The equal-loss phase may be smaller than the judged phase, because autofocus cannot correct every part of the
-        phase. The allowable is scaled by the same factor, so that the utilization does not change. Without a declared
-        phase the allowable stays the same. `equal_loss` is the equal-loss phase by the gating model, and `of_full`
-        the equal-loss phase by the full model. Both have the shape (cases,) and are in radians.
+        The equal-loss phase is the quadratic phase that would lower the image peak as much as the errors do. It may
+        be smaller than the judged phase, which includes the autofocus gain for the part of the errors that autofocus
+        cannot correct. The allowable is scaled by the same factor as the declared value, so that the utilization does
+        not change. Without a declared phase the allowable stays the same. Two equal-loss phases (cases,) [rad] are
+        given: `equal_loss` from the model that judges the row, and `of_full` from the full model.
         """
         judged = self.judged
         with np.errstate(all="ignore"):
@@ -301,9 +308,10 @@ class Aggregate(FamilyRow):
         )
 
     def _passes_with(self, case: Case, model: str) -> Note:
-        """State the smallest pull-in range of autofocus, N_pull, with which the sum would pass.
+        """Write a note with the smallest N_pull with which the sum would pass.
 
-        If no autofocus could correct the sum, the note states that instead.
+        N_pull is the pull-in range of autofocus in units of π rad. If no autofocus could make the sum pass, the note
+        reports this instead.
         """
         together, owner = case.analysis.together(model), self.judged.subject.owner
         members = together.owed(case.allocation.qpe, owner)
@@ -314,10 +322,10 @@ class Aggregate(FamilyRow):
 
 # ---------------------------------------------------------------------- totals of effects
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
-    """Compute the cubic, spread and tone phases [rad] of each declared error with one model.
+    """Compute the cubic, spread and tone phases of each declared error with one model. [rad]
 
-    The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread power, and `tone` for the
-    peak phases of tones. Each value is a list of pairs (row id, phase).
+    The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread energy over the image,
+    and `tone` for the peak phases of tones. Each value is a list of pairs (row id, phase).
     """
     array, together = analysis.errors.array, analysis.together(model)
     return {
@@ -333,8 +341,8 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
 def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
     """Find the effects that no requirement limits, and the rows of the errors that cause them.
 
-    Rows are marked only in the cases in which the effect is not negligible. With several gating models, the largest
-    value of each effect is used. `instead` holds random errors that replace the errors with the same ids.
+    A row is included only in the cases in which its effect is not negligible. If both models judge the mission, the
+    larger value of each effect is used. `instead` holds random errors that replace the errors with the same ids.
     """
     needs = analysis.mission.requirements
     level = negligible_rad(analysis.mission)
@@ -367,9 +375,9 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
 
 
 def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
-    """Replace the cubic and spread phases [rad] in `parts` by those of the given errors.
+    """Replace the cubic and spread phases of random errors in `parts` by the phases of the given errors. [rad]
 
-    Errors are matched by their ids.
+    Errors are matched by their ids. For the keys of `parts` see `effect_parts`.
     """
     ids = {error.id for error in errors}
     exchanged = {name: [phase for phase in phases if phase[0] not in ids] for name, phases in parts.items()}
@@ -381,7 +389,7 @@ def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model
 
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Booleans]:
-    """Find the random errors that displace the image by an unknown amount, for example the errors of unset clocks.
+    """Find the random errors that displace the image by an unknown amount, for example clocks that were never set.
 
     The result maps the row id of each random error to a mask of the cases in which the amount is unknown, (cases,).
     """
@@ -390,7 +398,11 @@ def unplaced(together: Together) -> dict[str, Booleans]:
 
 # ---------------------------------------------------------------------- in words
 class _Words(NamedTuple):
-    """Wording of the row for a sum of errors: the summed effect, its unit, the key of the file, and the equations."""
+    """Wording of the row for a sum of errors.
+
+    The fields are the name and the unit of the summed effect, the key in the mission file to which the row refers,
+    and the equation of each model.
+    """
 
     what: str
     unit: str
@@ -429,8 +441,8 @@ def _wording_of(row_subject: Subject, rule: str) -> _Words:
 def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
     """Return the row id and the size of the largest error in a sum, with a note on that size.
 
-    The size is a phase [rad] or a displacement [m]. The note tells whether the size relies on extrapolated noise or
-    on a folded spur. It is empty otherwise.
+    The size is a phase [rad] or a displacement [m]. There is a note if the size depends on extrapolated phase noise,
+    or on a spur that synchronisation folds to a low frequency. Otherwise the note is empty.
     """
     together, row_subject = case.analysis.together(model), aggregate.judged.subject
     wording = _wording_of(row_subject, aggregate.rule)
@@ -450,10 +462,10 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
 
 
 def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Note:
-    """Write a note that names the folded spur which causes most of an oscillator's phase.
+    """Write a note that names the folded spur that causes most of an oscillator's phase.
 
-    If the platforms exchange pulses to synchronise, spurs fold to low frequencies. The note is empty if no spur
-    causes most of the phase.
+    If the platforms exchange pulses to synchronise, spurs are folded (aliased) to low frequencies. The note is empty
+    if no spur causes most of the phase.
     """
     T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
     for spur in spurs_of(case.mission):
@@ -464,10 +476,10 @@ def _folded_spur(case: Case, row_id: str, size: float, *, is_cubic: bool) -> Not
 
 
 def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
-    """Explain why a pass becomes a warning; empty if it does not.
+    """Explain why a pass becomes a warning; the note is empty if there is no reason for a warning.
 
-    There are three possible reasons: all errors together exceed the limit, the sum under the non-gating model exceeds
-    it, or the row depends on noise below the first point of a mask.
+    There are three possible reasons: all errors together exceed the limit, the sum according to the model `other`
+    exceeds it, or the row depends on phase noise at frequencies below the first point of a phase-noise mask.
     """
     if limit is None:
         return NOTHING
@@ -491,7 +503,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 # ---------------------------------------------------------------------- the scene's edge
 @dataclass(frozen=True, eq=False)
 class JudgedScene:
-    """Phase errors at the edge of the scene relative to those at its centre, for an array of cases.
+    """Difference between the phase errors at the edge and at the centre of the scene, for an array of cases.
 
     `edges` is None if no error is declared.
     """
@@ -501,16 +513,17 @@ class JudgedScene:
 
     @cached_property  # a slow search, which sweeps do not need
     def corrections(self) -> Corrections | None:
-        """Distance from the scene centre up to which one autofocus correction suffices; None if there is no error.
+        """Search for the distances from the scene centre up to which one autofocus correction suffices.
 
-        The search for this distance is slow. It runs only when the text of the row is written.
+        The result is None if no error is declared. The search is slow, and runs only when the text of the row is
+        written.
         """
         return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
-        """Return the edge of the scene in one case; None if no error is declared.
+        """Return the results for the edge of the scene in one case; None if no error is declared.
 
-        The result includes the distance up to which one autofocus correction is sufficient.
+        They include the distance up to which one autofocus correction is sufficient.
         """
         return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 

@@ -1,9 +1,10 @@
 """Check missions: compare declared errors with the allocated budget, with one row for each error and for each sum.
 
-`check_mission` checks one mission. `check_missions` checks several missions, and computes missions of the same shape
-together as an array of cases. `check_files` checks files, and uses all cores if there are many. The findings of one
-mission consist of several hundred objects. A caller that needs only a report passes a function `keep`. It reduces
-the findings in the process that made them, which saves a quarter of the time for a thousand missions.
+`check_mission` checks one mission. `check_missions` checks several missions, and computes missions whose files have
+the same structure together as an array of cases. `check_files` checks files, and uses all cores if there are many
+files. The findings of one mission consist of several hundred objects. A caller that needs only a report therefore
+passes a function `keep`, which reduces the findings in the process that made them. This saves a quarter of the time
+for a thousand missions.
 """
 
 import gc
@@ -51,7 +52,7 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     Parameters
     ----------
     mission : Mission
-        Mission as loaded.
+        Mission as loaded from its file.
     today : date
         Day (UTC) on which waivers are judged.
     outside : Outside
@@ -72,9 +73,9 @@ def check_missions(
 ) -> Iterator[tuple[int, MissionFindings]]:
     """Check missions, and yield the index and the findings of each mission, in any order.
 
-    Missions of the same shape are checked together as arrays. The findings have the same statuses and sentences as
-    those of `check_mission`. Their numbers may differ within the tolerance of the numerical search. If
-    `keeps_analysis` is true, the findings of each mission include its analysis, for further computations.
+    Missions whose files have the same structure are checked together as arrays. The findings have the same statuses
+    and sentences as the findings of `check_mission`. Their numbers may differ within the tolerance of the numerical
+    search. If `keeps_analysis` is true, the findings of each mission include its analysis, for further computations.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -114,7 +115,7 @@ def _findings(
 ) -> MissionFindings:
     """Collect the findings for one judged case, including their text.
 
-    `losses_db` are the losses of the image peak in all judged cases, see `peak_loss_db`. [dB]
+    `losses_db` [dB] are the losses of the image peak in all judged cases, see `peak_loss_db`.
     """
     loss_db = case.number(losses_db)
     peak_loss = loss_db if math.isfinite(loss_db) else None  # no image, or no declared error
@@ -202,9 +203,9 @@ FILES_AT_ONCE = 500  # largest number of files that are checked together
 
 
 class Draws(NamedTuple):
-    """Arguments of `monte_carlo`: the number of draws, the seed, and `share`, the part of the draws to compute.
+    """Arguments of `monte_carlo`: number of draws, seed, and the share of the draws to compute.
 
-    `share` works only within a single process.
+    If `share` is not None, the files are checked within a single process.
     """
 
     number: int
@@ -213,12 +214,15 @@ class Draws(NamedTuple):
 
 
 def without_analysis(findings: CheckedMission) -> CheckedMission:
-    """Return the findings without their analysis, which would fill the memory for a thousand missions."""
+    """Return the findings without their analysis, because a thousand analyses would fill the memory."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
 def whole(findings: CheckedMission) -> CheckedMission:
-    """Return the findings unchanged, with their analysis, which is too large to be sent between processes."""
+    """Return the findings unchanged, with their analysis.
+
+    Use this only within one process, because the analysis is too large to be sent to another process.
+    """
     return findings
 
 
@@ -232,7 +236,7 @@ def check_files(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Kept]:
-    """Check files, and return the results in the order of the files. Many files are checked on all cores.
+    """Check mission files, and return the results in the order of the files. Many files are checked on all cores.
 
     Parameters
     ----------
@@ -241,13 +245,14 @@ def check_files(
     today : date
         Day (UTC) on which waivers are judged.
     model : str or None
-        Gating model to use instead of the model that each file states. If None, each file's own model is used.
+        Model that decides the verdicts (gating model), instead of the model that each file states. If None, each
+        file's own model is used.
     keep : callable
         Function that reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
         Arguments of a Monte Carlo simulation. If None, there is no simulation.
     changes : sequence of SetValue
-        Values that replace values of each file.
+        Values that replace values in each file.
     outside : Outside
         Options, settings and environment variables that affect the verdicts.
 
@@ -277,7 +282,8 @@ def check_files(
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
     """Divide files into chunks that are checked together. If there are many files, the number of chunks is even.
 
-    The number of cores does not affect the division, because the last digits of a result depend on its chunk.
+    The division does not depend on the number of cores, because the last digits of a result depend on the chunk to
+    which a file belongs.
     """
     count = 1 if len(files) < FILES_FOR_TWO_PROCESSES else 2 * math.ceil(len(files) / (2 * FILES_AT_ONCE))
     ends = [chunk * len(files) // count for chunk in range(count + 1)]

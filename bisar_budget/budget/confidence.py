@@ -10,11 +10,11 @@ from bisar_budget.phrases import Note
 
 
 def confidence_of(case: Case) -> Note:
-    """Return the confidence level of the verdict on one case, worded to end a sentence, for example `at 1 sigma`.
+    """Return the confidence level of the verdict on one case, as the end of a sentence, for example `at 1 sigma`.
 
     If the file states bounds, the wording is for example `for the stated bounds`. Errors for which the file gives a
-    size but no distribution are ignored: amplitudes of vibration, `other` errors and the terrain. Errors of 0 are
-    considered only if all errors are 0.
+    size but no distribution are ignored: amplitudes of vibration, `other` errors and the terrain. Errors whose size
+    is 0 are considered only if all errors are 0.
     """
     stated = list(_stated(case))
     distributions = {name for name, is_nonzero in stated if is_nonzero} or {name for name, _ in stated}

@@ -1,7 +1,7 @@
-"""Warnings for rows that depend on phase noise below the first point of a mask, which no data sheet specifies.
+"""Warnings for rows that depend on phase noise at frequencies for which no data sheet gives a value.
 
 A mask gives the phase noise of an oscillator at several offset frequencies. Below its first point it is extrapolated
-as f⁻³. A pass becomes a warning if more than half of a row's power lies in this extrapolated part and the row uses
+as f⁻³. A pass becomes a warning if more than half of a row's power comes from this extrapolated part and the row uses
 more than a tenth of its limit. The warning gives the frequency down to which the mask should reach.
 """
 
@@ -24,17 +24,18 @@ Part = str  # quadratic, cubic, spread or displacement
 
 
 def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
-    """Return one kind of effect of an error, per unit of the error.
+    """Return one kind of effect that one unit of an error causes.
 
-    The effect is a phase [rad], an rms phase [rad] or a displacement [m]. `effect_kind` names it.
+    The effect is a phase [rad], an rms phase [rad] or a displacement [m]. `effect_kind` names its kind, such as
+    `quadratic`.
     """
     return getattr(effect, effect_kind)
 
 
 def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase:
-    """Sum the squared effects that phase noise below the first points of masks causes; 0 without such noise.
+    """Sum the squared effects of phase noise at frequencies below the first points of masks; 0 without such noise.
 
-    All declared `errors` are summed. `effect_kind` names the effect, such as `quadratic`.
+    The sum includes all declared errors among `errors`. `effect_kind` names the kind of effect, such as `quadratic`.
     """
     power: PerCase = 0.0
     for error in errors:
@@ -44,10 +45,10 @@ def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> PerCase
 
 
 def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCase, limit: PerCase) -> PerCaseFlag:
-    """Decide whether a row depends on phase noise below the first points of masks, as a Boolean or an array (cases,).
+    """Decide whether a row depends on phase noise at frequencies below the first points of phase-noise masks.
 
-    It does if this noise makes up more than half of the power of the row, and if the `size` of the row exceeds a
-    tenth of its `limit`.
+    This is so if such noise makes up more than half of the power of the row, and if the `size` of the row exceeds a
+    tenth of its `limit`. The result is a Boolean or an array (cases,).
     """
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
@@ -55,7 +56,7 @@ def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: PerCa
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
-    """Write a note that a row depends on phase noise below the first points of masks.
+    """Write a note that a row depends on phase noise at frequencies below the first points of phase-noise masks.
 
     The note gives the fraction of the row's power that is due to this noise, and the frequency down to which the
     masks should reach. It is empty if no declared error has such noise or if `size` is 0.

@@ -33,9 +33,9 @@ _TILTING_FIGURES = [figure for figure in INERTIAL_FIGURES.values() if figure.til
 class Missing(NamedTuple):
     """A required error that the file does not declare.
 
-    `owner` and `kind` are the owner and the kind of its budget rows, and `key` is the key to add to the file. Some
-    errors need two entries to have any effect. If the file gives only one of them, `lacks` describes the missing
-    entry.
+    `owner` is a platform, the clock or the mission, `kind` is the kind of error, and `key` is the key to add to the
+    file. Some errors need two entries in the file to have any effect. If the file gives only one of them, `lacks`
+    describes the missing entry.
     """
 
     owner: str
@@ -72,9 +72,10 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
 
 
 def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
-    """Describe the missing acceleration sensitivity or vibration of an oscillator; empty if nothing is missing.
+    """Describe which entry of an oscillator is missing: its acceleration sensitivity or its vibration.
 
-    Vibration and acceleration sensitivity have an effect only together.
+    Vibration and acceleration sensitivity have an effect only together. The text is empty if both or neither are
+    given.
     """
     platform: Platform = getattr(mission.platforms, name)
     if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
@@ -101,7 +102,7 @@ def _vibrates(platform: Platform) -> PerCaseFlag:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty string, for kinds of error that need only a single entry."""
+    """Return an empty string, because the kind of error needs only a single entry, which the file has."""
     return ""
 
 
@@ -202,7 +203,7 @@ _REGISTERED = _OfPlatform(_has_own_source, is_owed=False)  # no file is obliged 
 
 
 def _of_platforms() -> Mapping[str, _OfPlatform]:
-    """Kinds of error that a platform can have, by name, including those that other packages registered."""
+    """Return the kinds of error that a platform can have, by name, including kinds that other packages registered."""
     return {**_KINDS_OF_PLATFORMS, **dict.fromkeys(registered_names(), _REGISTERED)}
 
 
@@ -243,9 +244,10 @@ def _runs_two_clocks(mission: Mission) -> bool:
 
 
 def _lacking_of_setting(mission: Mission) -> list[str]:
-    """List the missing keys of `synchronization`.
+    """List the keys of `synchronization` that the file lacks.
 
-    Clocks in holdover need both the time error and the frequency error that remain after synchronisation.
+    If the whole section is missing, the list contains `synchronization`. Clocks in holdover need both the time error
+    and the frequency error that remain after synchronisation.
     """
     sync = mission.synchronization
     if sync is None:
@@ -255,9 +257,11 @@ def _lacking_of_setting(mission: Mission) -> list[str]:
 
 
 def _legs_without_delay(mission: Mission) -> list[str]:
-    """List the missing keys of the atmosphere: `propagation`, or the legs without a delay.
+    """List the keys of atmospheric delays that the file lacks.
 
-    A leg needs a delay only if its elevation is high enough for a zenith delay to apply.
+    If the section `propagation` is missing, it is the only key in the list. Otherwise the list has the keys of the
+    legs of the path for which the file gives no delay. A leg needs a delay only if its elevation is high enough for a
+    zenith delay to apply.
     """
     if mission.propagation is None:
         return ["propagation"]
@@ -314,7 +318,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
     """List the kinds of error that a mission declares, fails to declare, or declares without stating a source.
 
     A covariance counts as position and velocity. If a direct path serves as the clock, timing errors and oscillators
-    are not listed. The result also lists the spectra that the file raises or lowers by a level.
+    are not listed. The result also lists the spectra that the file shifts by a number of decibels.
     """
     declared, missing, without_source = list[str](), list[str](), list[str]()
     still = still_platforms(mission)
@@ -344,7 +348,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
 
 
 def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
-    """Yield each phase-noise or vibration spectrum that the file raises or lowers by a level in decibels."""
+    """Yield each phase-noise or vibration spectrum that the file raises or lowers by a number of decibels."""
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         oscillator, vibration = platform.oscillator, platform.motion_error.vibration
@@ -377,7 +381,7 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     - position and velocity: their own values or a covariance;
     - the clock: any term of its error;
     - a vibration: lines or noise;
-    - an inertial sensor: any of its values;
+    - an inertial sensor: any of its figures;
     - the atmosphere: the delays of each leg.
 
     For a platform that does not move, only the position is required, and the oscillator if the requirement names the
@@ -386,9 +390,9 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     Parameters
     ----------
     mission : Mission
-        Mission as loaded.
+        Mission as loaded from its file.
     still : container of str, optional
-        Names of the platforms that do not move; omitted: derived from the paths.
+        Names of the platforms that do not move. If omitted, they are derived from the paths.
     """
     if not mission.requirements.declare:
         return []

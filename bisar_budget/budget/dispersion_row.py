@@ -1,8 +1,8 @@
-"""The row for dispersion: free electrons cause a quadratic phase over the band, which blurs the image in range.
+"""Budget row for dispersion: free electrons cause a quadratic phase over the band, which blurs the image in range.
 
 Dispersion is compared with the requirement on the quadratic phase separately from all other errors, because a phase
-over frequency does not add to phases over slow time. Dispersion may use the full requirement, because no share of it
-belongs to the atmosphere. Autofocus does not correct dispersion.
+error over frequency does not combine with phase errors over slow time. Dispersion may use the full requirement,
+because no share of it belongs to the atmosphere. Autofocus does not correct dispersion.
 """
 
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["Dispersio
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DispersionRow(FamilyRow):
-    """The row for the quadratic phase [rad] over the band that free electrons cause, for an array of cases."""
+    """Budget row for the quadratic phase [rad] that free electrons cause over the band, for an array of cases."""
 
     def in_words(self, case: Case, model: str) -> Row:
         """Build the report row for one case, including its text. The row is the same for both models."""

@@ -1,10 +1,10 @@
 """Detection of doubtful oscillator noise. Rows that depend on such noise are not evaluated.
 
 There are two reasons for doubt. First, the file may name a catalogue part and replace its phase-noise mask without
-giving the carrier frequency of the new mask. The mask is then assumed to apply at the frequency of the part. At
-another frequency the same decibels would mean a different noise. Second, a power law may fit an Allan deviation so
-badly that it does not describe the oscillator. If doubtful noise uses more than a tenth of a limit, the row with this
-limit is not evaluated, unless it fails anyway.
+giving the carrier frequency of the new mask. The mask is then assumed to apply at the carrier frequency of the part.
+If it applied at another carrier frequency, the noise would be different. Second, a power law may fit an Allan
+deviation so badly that it does not describe the oscillator. If doubtful noise uses more than a tenth of a limit, the
+row with this limit is not evaluated, unless it fails anyway.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,8 +26,8 @@ def rests_on_doubted_noise(
 ) -> PerCaseFlag:
     """Decide whether doubtful noise uses more than a tenth of a limit, as a Boolean or an array (cases,).
 
-    `effect_kind` names the effect. The effects of all oscillators with doubtful noise are added as a root-sum-square.
-    `limit` is in the unit of the effect.
+    `effect_kind` names the kind of effect, such as `quadratic`, and `model` is `published` or `full`. The effects of
+    all oscillators with doubtful noise are combined as a root-sum-square. `limit` is in the unit of the effect.
     """
     power: PerCase = 0.0
     for error in errors:
@@ -39,19 +39,19 @@ def rests_on_doubted_noise(
 
 
 def has_doubted_frequency(mission: Mission, platform: str) -> bool:
-    """Whether an oscillator has spurs for which the carrier frequency is doubtful.
+    """Whether the carrier frequency to which the spurs of an oscillator refer is doubtful.
 
-    The frequency is doubtful if the file replaces the noise of a catalogue part by a mask without a frequency. The
-    spurs are then assumed to be stated at the frequency of the part.
+    This is so if the oscillator has spurs, and the file replaces the noise of a catalogue part by a mask without a
+    carrier frequency. The spurs are then assumed to be stated at the carrier frequency of the part.
     """
     oscillator = getattr(mission.platforms, platform).oscillator
     return oscillator is not None and bool(oscillator.spurs) and oscillator.mask_at_frequency_of_part is not None
 
 
 def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
-    """Write a note on why the noise of oscillators is doubtful; empty if it is not.
+    """Write a note on why the noise of oscillators is doubtful; the note is empty if no noise is doubtful.
 
-    The note names the keys that cause the doubt, and the entries to write instead.
+    The note names the keys that cause the doubt, and the entries that should replace them.
     """
     notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
     return notes[0].then(*notes[1:]) if notes else NOTHING

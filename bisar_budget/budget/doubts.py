@@ -1,14 +1,14 @@
-"""Doubts about the input of a check: inaccurate paths, and collections to which a model may not apply.
+"""Doubts about the input of a check: inaccurate paths, and collections for which a model may not be valid.
 
 A path from an orbit or a log may differ from the true path by a known distance. The causes are the age of the orbital
 elements, the interpolation of the ephemeris, and the residual of the smoothed log. A declared position error smaller
 than this distance cannot be right. A declared error cannot be right either if the source of the path states a larger
 error.
 
-A log has two further errors. The residual is the difference between the fixes of the log and its smooth path. The
-rounding step is the step to which the fixes are rounded. A processor that uses the smooth path has neither error. A
-processor that uses the fixes has both errors in its image. If the file does not state which path the processor uses
-(`trajectory.processed`), neither error can be judged.
+A log of position fixes has two further sources of error. The residual is the difference between the fixes and the
+smooth path fitted to them. The rounding step is the step to which the fixes are rounded. A processor that uses the
+smooth path has neither error. A processor that uses the fixes has both errors in its image. If the file does not
+state which path the processor uses (`trajectory.processed`), neither error can be judged.
 """
 
 import math
@@ -45,14 +45,15 @@ _EQUAL_VARIANCE_FRACTION = 1e-6  # relative tolerance for rounding, when axes ar
 class InputDoubt:
     """A possible error of a platform's path that is larger than the error that the file declares.
 
-    `doubt` is the distance by which the true path may differ from the path, or the error that the source of the path
-    states. `declared` is the declared error without the coverage factor; it is 0 if the file declares no error. Both
-    are given along the axis on which `doubt` exceeds `declared` most, or as root-sum-squares if the doubt has no
-    direction. The unit is that of `state`, the kind of the error. `note` gives both values in words.
+    `doubt` is the possible error: the distance by which the true path may differ from the given path, or the error
+    that the source of the path states. `declared` is the declared error without the coverage factor; it is 0 if the
+    file declares no error. Both are given along the axis on which `doubt` exceeds `declared` most. If the possible
+    error has no direction, both are root-sum-squares over the axes. Their unit is the unit of `state`, the kind of
+    the error. `note` gives both values in words.
 
-    If `is_of_log` is set, the doubt comes from a log. It then concerns either the log's residual or its rounding. For
-    the residual, `doubt` is the phase that it causes, and `declared` is the largest acceptable phase [rad]. For the
-    rounding, `doubt` is the step to which the fixes are rounded [m].
+    If `is_of_log` is set, the doubt concerns the residual or the rounding of a log of position fixes. For a residual,
+    which is the difference between the fixes and the smooth path, `doubt` is the phase that it causes, and `declared`
+    is the largest acceptable phase [rad]. For rounding, `doubt` is the step to which the fixes are rounded [m].
     """
 
     owner: str
@@ -65,17 +66,20 @@ class InputDoubt:
 
     @property
     def is_phase(self) -> bool:
-        """Whether the doubt is about the phase that a log's residual causes, and not about an error of the path."""
+        """Whether the doubt is about the phase that the residual of a log causes, and not about an error of the path.
+
+        The residual is the difference between the position fixes of the log and the smooth path fitted to them.
+        """
         return self.state is None
 
     @property
     def kind(self) -> str:
-        """Name of the kind of error; `residual` for the residual of a log."""
+        """Name of the kind of error, such as `position`; it is `residual` for the residual of a log."""
         return "residual" if self.state is None else self.state.name
 
     @property
     def unit(self) -> str:
-        """Unit of `doubt` and of `declared`, such as `rad` for the residual of a log."""
+        """Unit of `doubt` and of `declared`, for example `m` for a position error or `rad` for a log's residual."""
         return "rad" if self.state is None else self.state.unit
 
 
@@ -110,7 +114,7 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind
     """Find the cases in which the path of a platform may be less accurate than the file declares.
 
     The result maps the name of the platform and the kind of error to a mask, (cases,). The kind is None for the
-    residual of a log.
+    residual of a log, which is the difference between its position fixes and the smooth path.
     """
     doubted: dict[tuple[str, StateKind | None], Booleans] = {}
     for name in PLATFORMS:
@@ -130,9 +134,9 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind
 def strays(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a platform's true path may differ from its given path by more than the declared position error.
 
-    The result is a Boolean or an array (cases,). If no position error is declared, the result is true in two
-    situations. Either the age, the interpolation or the residual is unusual, or the possible difference would use
-    more than a negligible part of a requirement.
+    The result is a Boolean or an array (cases,). If no position error is declared, the result is true in two cases:
+    if the age of the orbital elements, the interpolation of the ephemeris or the residual of the log is unusual, and
+    if the possible difference would use more than a negligible part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -148,7 +152,7 @@ def strays(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def declared_position_error(error: MotionError) -> Any:
-    """Root-sum-square of a platform's constant and random position errors [m]; None without such an error.
+    """Root-sum-square of a platform's constant and random position errors; None if no such error is declared. [m]
 
     The result is an array (cases,) if the mission has arrays in place of numbers.
     """
@@ -158,11 +162,11 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION_KIND) -> bool:
-    """Whether a row depends on one kind of path error of the platform `owner`.
+    """Whether a row depends on a path error of the platform `owner` that is in doubt.
 
-    The row must refer to the frame in which the file states the error. A `state` of None stands for the residual of a
-    log. The residual spreads power. The rows that depend on it are its own row, and the rows that sum spread power
-    for the platform and for the mission.
+    `state` is the kind of the path error. The row must refer to the frame in which the file states the error. If
+    `state` is None, the error is the residual of a log, which spreads power over the image. The rows that depend on
+    it are its own row, and the rows that sum spread power for the platform and for the mission.
     """
     if state is None:
         return row_subject in (residual_subject(owner), subject(owner, "islr"), subject("mission", "islr"))
@@ -176,10 +180,10 @@ def states_more(mission: Mission, name: str, state: StateKind, stated: StatedAcc
     """Whether the source of a path states a larger error than the file declares, as a Boolean or an array (cases,).
 
     An error is larger if its variance is larger in any direction. If the source gives no directions, the
-    root-sum-squares are compared. A larger velocity error matters only if it would use more than a negligible part of
-    a requirement: an ephemeris may have good positions and bad velocities, and the path follows the positions. If the
-    file declares no position error, the same condition applies to a position error that is only typical of the
-    source.
+    root-sum-squares are compared. A larger velocity error counts only if it would use more than a negligible part of
+    a requirement. The reason is that an ephemeris may have good positions and bad velocities, and the path follows
+    the positions. If the file declares no position error, the same condition applies to a position error that is
+    merely typical of this kind of source.
     """
     platform: Platform = getattr(mission.platforms, name)
     stated_covariance = _stated_covariance(stated, state, platform)
@@ -208,7 +212,7 @@ def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platf
     """Covariance (..., 3, 3) of the stated errors along the scene's axes; None if the source does not state it.
 
     `state` is the kind of the errors, position [m²] or velocity [m²/s²]. If a platform is in free fall and the file
-    states its errors in the orbital frame `ric`, the velocity is inertial.
+    states its errors in the orbital frame `ric`, the velocity is an inertial velocity.
     """
     covariance, row, fall = stated.covariance, 3 * state.order, platform.state.fall
     if covariance is None or len(covariance) <= row:
@@ -227,7 +231,10 @@ def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platf
 
 
 def _declared_covariance(platform: Platform, state: StateKind) -> Floats:
-    """Covariance (..., 3, 3) of the declared errors of one kind along the scene's axes, in [m²] or [m²/s²]."""
+    """Covariance (..., 3, 3) of the declared errors of one kind, along the scene's axes.
+
+    `state` is the kind of the errors: position, with the covariance in [m²], or velocity, in [m²/s²].
+    """
     error = platform.motion_error
     sizes = error.stated(state.name) or (0.0, 0.0, 0.0)
     correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(state.name)
@@ -241,13 +248,16 @@ def _declared_covariance(platform: Platform, state: StateKind) -> Floats:
 
 
 def _stack(rows: Sequence[Sequence[PerCase]]) -> Floats:
-    """Stack a 3-by-3 table of elements, which are numbers or arrays (cases,), into matrices (..., 3, 3)."""
+    """Stack the nine elements of 3-by-3 matrices, which are numbers or arrays (cases,), into an array (..., 3, 3).
+
+    `rows` holds three rows of three elements.
+    """
     elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
     return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
 
 
 def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: StatedAccuracy) -> InputDoubt:
-    """Describe the doubt about a path whose source states a larger error than the file declares.
+    """Describe the doubt that arises because the source of a path states a larger error than the file declares.
 
     Both errors are given along the axis on which they differ most.
     """
@@ -285,13 +295,19 @@ def _stated_doubt(platform: Platform, name: str, state: StateKind, stated: State
 
 # ---------------------------------------------------------------------- the residual of a log
 def leaves_unsaid(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether a log's residual is too large, and the file does not state which path the processor uses."""
+    """Whether a log's residual causes too large a phase, and the file does not state which path the processor uses.
+
+    The residual is the difference between the position fixes of the log and the smooth path fitted to them.
+    """
     log = _unsaid_log(mission, name)
     return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
 
 
 def residual_phase(mission: Mission, name: str) -> PerCase:
-    """Rms phase [rad] over the aperture that a log's residual causes along the line of sight; 0 without a log."""
+    """Rms phase over the aperture that a log's residual causes along the line of sight; 0 without a log. [rad]
+
+    The residual is the difference between the position fixes of the log and the smooth path fitted to them.
+    """
     path: FlownPath | None = getattr(mission.platforms, name).path
     if path is None or path.log_noise is None:
         return 0.0
@@ -305,11 +321,11 @@ def residual_phase(mission: Mission, name: str) -> PerCase:
 
 
 def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
-    """Whether the rounding step of a log's fixes is too coarse, and the file does not state which path is processed.
+    """Whether the fixes of a log are rounded too coarsely, and the file does not state which path the processor uses.
 
-    A step is too coarse if it exceeds a tenth of the declared position error along any direction. If the file
-    declares no position error, the step must also use more than a negligible part of a requirement. Rounding is a
-    uniform error with a variance of one twelfth of the square of the step.
+    The rounding step is too coarse if it exceeds a tenth of the declared position error along any direction. If the
+    file declares no position error, the step must also use more than a negligible part of a requirement. Rounding is
+    a uniform error with a variance of one twelfth of the square of the step.
     """
     log = _unsaid_log(mission, name)
     if log is None:
@@ -326,9 +342,9 @@ def is_coarse(mission: Mission, name: str) -> PerCaseFlag:
 
 
 def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
-    """Return the noise of a platform's log if the file does not state which path the processor uses.
+    """Return the noise of a platform's log, if the file does not state which path the processor uses.
 
-    The result is None if the file states it, and for a platform without a log.
+    The result is None if the file states this path, or if the platform has no log.
     """
     path: FlownPath | None = getattr(mission.platforms, name).path
     log = None if path is None else path.log_noise
@@ -336,10 +352,10 @@ def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
 
 
 def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
-    """Describe the doubt that the rounding step of a log's fixes causes.
+    """Describe the doubt that arises from the coarse rounding of a log's position fixes.
 
-    The step and the declared position error are given along the axis on which the step most exceeds the permitted
-    fraction of the declared position error.
+    The rounding step and the declared position error are given along the axis on which the step most exceeds the
+    permitted fraction of the declared position error.
     """
     assert platform.path is not None
     assert platform.path.log_noise is not None
@@ -358,7 +374,10 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
 
 # ---------------------------------------------------------------------- the effect of a doubt
 def _matters(mission: Mission, name: str, state: StateKind, covariance: Floats) -> Booleans:
-    """Whether an error with the given covariance uses more than a negligible part of a requirement, (cases,)."""
+    """Whether an error with the given covariance would use more than a negligible part of a requirement, (cases,).
+
+    `state` is the kind of the error, position or velocity, and `name` is the platform.
+    """
     needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
     with np.errstate(all="ignore"):
         before, middle, after = _range_errors(mission, name, state, half)
@@ -379,8 +398,8 @@ def _matters(mission: Mission, name: str, state: StateKind, covariance: Floats) 
 def _range_errors(mission: Mission, name: str, state: StateKind, half: Floats) -> Sequence[Floats]:
     """Range errors that a unit error of a platform along each axis causes at the slow times −T/2, 0 and T/2.
 
-    T is the aperture time. Each of the three arrays has the shape (..., 3). Its unit is [m/m] for a position error,
-    and [m per m/s] for a velocity error.
+    T is the aperture time, and `half` is T/2 [s]. Each of the three arrays has the shape (..., 3). Its unit is [m/m]
+    for a position error, and [m per m/s] for a velocity error.
     """
     sights = [
         np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1) for time in (-half, 0.0 * half, half)
@@ -403,9 +422,9 @@ def _range_errors(mission: Mission, name: str, state: StateKind, half: Floats) -
 
 
 def _sight(mission: Mission, name: str, time: Any) -> Any:
-    """Change of range per metre [m/m] of a platform's motion along each axis (x, y, z), at a given slow time.
+    """Change of range per metre of a platform's motion along each axis (x, y, z), at a given slow time. [m/m]
 
-    With a direct path, the change of the direct path's range is subtracted.
+    If the receiver uses the direct path as its clock, the change of the direct path's range is subtracted.
     """
     platforms = mission.platforms
     path: PlatformState = getattr(platforms, name).state
@@ -419,10 +438,10 @@ def _sight(mission: Mission, name: str, time: Any) -> Any:
 
 
 def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
-    """Displacement on the ground per unit error along each axis, (..., 2, 3), by (25) of Rigling & Moses.
+    """Displacement of the image on the ground per unit error along each axis, by equation (25) of Rigling & Moses.
 
-    `constant` and `linear` are the range error and its rate, both per unit error. The first row of the result is the
-    displacement east, the second is the displacement north.
+    `constant` and `linear` are the range error and its rate, both per unit error. The result is (..., 2, 3). Its
+    first row is the displacement east, and its second row is the displacement north.
     """
     (a, b), (c, d) = geometry.range_gradient, geometry.doppler_gradient
     determinant = np.asarray(a * d - b * c)[..., None]
@@ -433,12 +452,12 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
 
 # ---------------------------------------------------------------------- errors of an orbit
 def orbit_notes(case: Case, rows: Sequence[Row]) -> Iterator[Note]:
-    """Yield a note for each platform in free fall whose position and velocity errors cannot be independent.
+    """Yield a note for each platform in free fall whose declared errors cannot be independent.
 
     The errors of an orbit are correlated: a position error δr comes with a velocity error of about n·δr, where n is
-    the angular rate of the orbit. Independent errors with a velocity error smaller than n·δr would leave more phase
-    than the errors of a real orbit. The note is given only if the position errors use more than a negligible part of
-    a limit.
+    the angular rate of the orbit. If the file declares independent errors, and a velocity error smaller than n·δr,
+    the computed phase is larger than the phase that the errors of a real orbit cause. The note is given only if the
+    position errors use more than a negligible part of a limit.
     """
     for index, name in enumerate(PLATFORMS):
         state, error = case.geometry.both[index], getattr(case.mission.platforms, name).motion_error
@@ -459,16 +478,17 @@ MAX_MODEL_DIFFERENCE_FRACTION = (
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
-    """Name the declared error for which the published model is least accurate; empty if it is accurate for all.
+    """Write a note on declared errors for which the published model is inaccurate.
 
-    The note names the row whose utilizations by the two models differ most.
+    The note names the row for which the utilizations in the two models differ most. It is empty if the published
+    model is accurate for all declared errors.
 
     Parameters
     ----------
     case : Case
         The judged case.
     rows : sequence of Row
-        Judged rows. Only rows that are judged by the published model, and whose error is nonzero in the file, are
+        Judged rows. Only rows that are judged by the published model, and whose declared error is not zero, are
         examined.
     """
     stated = {source.id for source in case.analysis.errors.stated if case.number(source.declared)}
@@ -489,7 +509,7 @@ def _is_apart(row: Row) -> bool:
 
 
 def _difference(row: Row) -> float:
-    """Absolute difference between the utilizations of a row by the published and by the full model."""
+    """Absolute difference between the utilizations of a row in the published model and in the full model."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
     published, full = (0.0 if limit is None else declared / limit for limit in limits)
     return abs(published - full)
@@ -500,7 +520,7 @@ _TURNING_RAD = 0.1  # half the rotation of a line of sight at which the quartic 
 
 
 def missing_settings(mission: Mission) -> list[str]:
-    """List the keys, `time_error` or `frequency_error`, that clocks in holdover need and the file lacks.
+    """List the keys, `time_error` or `frequency_error`, that clocks in holdover need but that the file lacks.
 
     They are keys of `synchronization`. The list is empty if the clocks are not in holdover.
     """
@@ -513,7 +533,7 @@ def missing_settings(mission: Mission) -> list[str]:
 def collection_notes(case: Case, peak_loss_db: float | None) -> Iterator[Note]:
     """Yield notes on model assumptions that a collection may violate, and on images with several peaks.
 
-    `peak_loss_db` is the loss of the image peak due to all declared errors. [dB] It is None if the loss is unknown.
+    `peak_loss_db` [dB] is the loss of the image peak due to all declared errors. It is None if the loss is unknown.
     """
     mission = case.mission
     for name, state in zip(PLATFORMS, case.geometry.both, strict=True):

@@ -44,7 +44,7 @@ _BINDING = np.array(
 
 
 class ErrorRows:
-    """Builds the rows of the position, velocity, acceleration, clock and `other` errors.
+    """Builds the rows of position, velocity, acceleration and clock errors, and of the `other` errors.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class ErrorRows:
     analysis : Analysis
         Analysis of the cases.
     limits : mapping of str to (cases,)
-        Limit on the quadratic phase of each owner, including the autofocus gain. [rad]
+        Limit on the quadratic phase [rad] for each owner (platform, clock or mission), including the autofocus gain.
     """
 
     def __init__(self, judging: Judging, analysis: Analysis, limits: Mapping[str, Floats]) -> None:
@@ -62,9 +62,10 @@ class ErrorRows:
         self.is_of_sums = analysis.is_of_sums
 
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
-        """Yield the rows of these errors under one gating model.
+        """Yield the rows of position, velocity, acceleration, clock and `other` errors.
 
-        A row that passes under the gating model becomes a warning if it fails under the non-gating model.
+        `gating` is the model that judges the rows. A row that passes in this model becomes a warning if it fails in
+        the other model.
         """
         for block_index in range(len(self.errors.blocks)):
             yield from self._of_block(block_index, gating)
@@ -116,9 +117,10 @@ class ErrorRows:
 def _is_over(
     does: Declared, gain: PerCase, limits: tuple[Floats, float | None, float | None], is_motion: PerCaseFlag
 ) -> PerCaseFlag:
-    """Decide for each error whether any of its effects exceeds its limit, (errors, cases).
+    """Decide for each error whether at least one of its effects exceeds its limit, (errors, cases).
 
-    The effects are the quadratic phase, the cubic phase and the displacement.
+    The effects are the quadratic phase, the cubic phase and the displacement of the image. `limits` holds the three
+    limits in this order.
     """
     limit, cubic, location = limits
     is_over = does.judged(gain) / limit > LIMIT_RATIO
@@ -180,7 +182,10 @@ class ErrorRow(FamilyRow):
 
 # ---------------------------------------------------------------------- in words
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
-    """Write the reason why a row fails, with the requirement that the declared error exceeds."""
+    """Write the reason why a row fails, including the requirement that the declared error exceeds.
+
+    `mine` holds the effects of the error in `model`, and `limit` [rad] is the limit of its quadratic phase.
+    """
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
         return phrases.note("beyond-the-image", end=case.number(row.allowable), unit=source.unit)
@@ -198,7 +203,10 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
-    """Explain why the declared error fails under the non-gating model; empty if it passes under that model."""
+    """Explain why the declared error fails in the model `other`, which does not judge the error.
+
+    The note is empty if the error passes in this model. `limit` [rad] is the limit of the quadratic phase.
+    """
     needs, theirs = case.mission.requirements, case.does(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
@@ -216,7 +224,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 
 def _cause(source: ErrorSource) -> Note:
-    """Name the effect of an error that the full model takes into account and the published model does not."""
+    """Write a note that names the effect of an error which the full model includes and the published model omits."""
     if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
     if source.kind.order == 0:
@@ -235,9 +243,9 @@ def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
 def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["SpecificationRow"]:
     """Yield the row of each specification, which compares the declared value with the specified value.
 
-    The largest value over the axes must not exceed the specified value. The coverage factor is not applied. The row
-    of an error that is specified but not declared is not evaluated. An error may use its full specification without a
-    warning.
+    If the file declares values for several axes, the largest of them must not exceed the specified value. The
+    coverage factor is not applied. If an error is specified but not declared, its row is not evaluated. An error may
+    use its full specification without causing a warning.
     """
     for number in analysis.mission.specifications.values():
         most, largest_declared = judging.array(number.value), judging.array(largest_at(analysis.mission, number))

@@ -40,7 +40,10 @@ from bisar_budget.ranges.resolution import Resolution
 
 
 class _Warned(NamedTuple):
-    """A warning: its sentence, and the key of the file to which it refers; None if it refers to the whole file."""
+    """A warning about a mission file: its sentence, and the key of the file to which it refers.
+
+    The key is None if the warning refers to the whole file.
+    """
 
     key: KeyPath | None
     message: Note
@@ -101,7 +104,10 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings about requirement ids for nonexistent rows, and about requirement texts for unknown ids."""
+    """Yield warnings about requirement ids without a row, and about requirement texts without a known id.
+
+    The ids and texts are stated in the mission file.
+    """
     if mission.requirement_ids:
         ids = [row.id for row in rows] + [id_of_requirement(key) for key in required_keys(mission)]
         unique_ids = set(ids)
@@ -117,7 +123,10 @@ def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _nearest(name: str, ids: Sequence[str]) -> str:
-    """Hint with the most similar known id, to append to a sentence about an unknown id; empty if no id is similar."""
+    """Make a hint with the most similar known id; empty if no id is similar.
+
+    The hint is appended to a sentence about an unknown id.
+    """
     hint = did_you_mean(name, tuple(ids))
     return hint and f". {hint}"
 
@@ -139,7 +148,10 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
 
 
 def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
-    """Yield a warning for each log whose noise, through the path fitted to it, noticeably changes the allowables."""
+    """Yield a warning for each log whose noise noticeably changes the allowables.
+
+    The noise acts on the allowables through the smooth path that is fitted to the log.
+    """
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
         if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
@@ -181,8 +193,8 @@ def paths_in_doubt(mission: Mission) -> Iterator[_Warned]:
 def _of_instruments(case: Case) -> Iterator[_Warned]:
     """Yield warnings about synchronisation and about errors that are stated twice.
 
-    The warnings about synchronisation concern pulses that are exchanged less than once per aperture, and clock errors
-    that the file does not give.
+    The warnings about synchronisation concern clocks that exchange pulses less than once per aperture, and clock
+    errors that the file does not give.
     """
     mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
@@ -210,7 +222,7 @@ def _of_idle_entries(mission: Mission) -> Iterator[_Warned]:
 
 
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings about doubtful oscillator noise that no row reports because no requirement depends on it."""
+    """Yield warnings about doubtful oscillator noise that no row mentions because no requirement depends on it."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
             if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):

@@ -1,4 +1,4 @@
-"""Changes of the allowables due to the noise of a log to which a platform's path is fitted.
+"""Changes of the allowables due to the noise of a log of positions to which a platform's path is fitted.
 
 The allowable of a position or velocity error depends on how the line of sight to the platform rotates. A path fitted
 to a noisy log has an error at each time of the aperture, and therefore each allowable has an error too. The error of
@@ -27,7 +27,7 @@ _DECISIVE_EFFECT_FRACTION = (
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable most affected by the noise of the log to which a platform's path is fitted.
+    """Allowable that is most affected by the noise of the log to which a platform's path is fitted.
 
     `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
     [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the id of the row with the
@@ -40,9 +40,10 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """Find the allowable that changes most due to the noise of one platform's log; None without a fitted path.
+    """Find the allowable that changes most due to the noise of the log to which a platform's path is fitted.
 
-    The allowables of the position and velocity errors of both platforms are examined.
+    The allowables of the position and velocity errors of both platforms are examined. The result is None if the path
+    is not fitted to a log.
     """
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
@@ -84,10 +85,11 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 
 
 def _changes(units: Floats) -> Floats:
-    """One sigma of the relative change of each allowable, (platforms, axes).
+    """One sigma of the relative change of each allowable due to the error of a fitted path, (platforms, axes).
 
-    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error. The axis `sides` holds the path
-    itself, then the path plus each mode of the fit error, then the path minus each mode.
+    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error, computed for several paths. The
+    paths along the axis `sides` are the fitted path itself, then the path plus each mode of the fit error, then the
+    path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

@@ -1,10 +1,9 @@
 """Causes of error that need two entries of the mission file, of which only one is given.
 
-Rows that depend on such a cause are not evaluated. Without this rule, a failing mission could pass after the worse of
-the two entries is deleted from its file. For two kinds of cause, the checks of the file do not require both entries.
-The first is a pair of clocks, which needs the oscillators of both platforms. The second is the vibration that an
-oscillator feels. If the airframe vibrates with tones and noise, `oscillator.vibration` needs both too, but the file
-may state only one of them.
+Rows that depend on such a cause are not evaluated. Otherwise, a failing mission could be made to pass by deleting the
+worse of the two entries from its file. There are two kinds of such causes. The first is a pair of clocks, which needs
+the oscillators of both platforms. The second is the vibration that an oscillator feels. If the airframe's vibration
+has tones and noise, `oscillator.vibration` needs both too, but the file may state only one of them.
 """
 
 from collections.abc import Iterator
@@ -27,7 +26,7 @@ class HalfCause:
     Attributes
     ----------
     platforms : tuple of str
-        Platforms with a stated oscillator that the cause affects.
+        Affected platforms whose oscillator is stated.
     requirements : tuple of str
         Keys of the requirements that limit the effects of the cause.
     note : Note
@@ -39,10 +38,10 @@ class HalfCause:
     note: Note
 
     def holds(self, subject: Subject) -> bool:
-        """Whether a row depends on the cause.
+        """Whether a row depends on this cause.
 
-        This holds for the rows of a stated oscillator, and for the mission's rows of the requirements that limit the
-        cause.
+        This is so for the rows of the oscillators of the affected platforms, and for the mission's rows of the
+        requirements that limit the effects of the cause.
         """
         if subject.id in [f"mission.{key}" for key in self.requirements]:
             return True
@@ -52,8 +51,8 @@ class HalfCause:
 def half_causes(mission: Mission) -> Iterator[HalfCause]:
     """Yield the causes of error that need two entries of the mission file, of which only one is given.
 
-    Examples are a pair of clocks with the oscillator of one platform only, and the vibration of an oscillator with
-    its tones but without its noise.
+    Examples are a pair of clocks for which only one oscillator is given, and an oscillator's vibration for which the
+    tones are given but not the noise.
     """
     yield from _half_clocks(mission)
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -78,10 +77,10 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
-    """Yield pairs of clocks for which the file does not state both oscillators.
+    """Yield the pair of clocks as an incomplete cause of error if the file does not state both oscillators.
 
-    In holdover, both oscillators must be stated. If the clocks exchange pulses, a missing oscillator matters only if
-    the oscillator of the other platform is stated.
+    For clocks in holdover, both oscillators must be stated. If the clocks exchange pulses, a missing oscillator
+    matters only if the oscillator of the other platform is stated.
     """
     sync = mission.synchronization
     stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
@@ -101,14 +100,16 @@ def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
-    """Select those of the keys for which the file states a requirement."""
+    """Select the keys for which the mission file states a requirement."""
     return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
 
 
 def half_cause_of(mission: Mission, key: str) -> Note:
-    """Write a note that names the entry to add if a requirement depends on a cause of error that lacks an entry.
+    """Write a note on missing entries of the mission file, if a requirement depends on an incomplete cause of error.
 
-    Such causes are listed by `half_causes`. The note is empty if the requirement depends on no such cause.
+    An incomplete cause needs two entries of the mission file, of which only one is given, see `half_causes`. `key` is
+    the key of the requirement. The note names the entries to add, and is empty if the requirement depends on no such
+    cause.
     """
     notes = [half.note for half in half_causes(mission) if key in half.requirements]
     return notes[0].then(*notes[1:]) if notes else NOTHING

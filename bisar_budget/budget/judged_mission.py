@@ -1,8 +1,9 @@
-"""Judges all rows and requirements of a mission, for an array of cases. The check of one mission is a single case.
+"""Judgement of all rows and requirements of a mission, for an array of cases.
 
-Each family of rows is judged by every gating model. With two models, the stricter verdict is used. Some judgements
-need more than one row and are made afterwards. They concern required declarations, inaccurate paths, effects that no
-requirement covers, and waivers.
+The check of one mission is a single case. Each family of rows is judged by every gating model, that is every model
+whose verdict counts. With two such models, the stricter verdict is used. Some judgements need more than one row and
+are made afterwards. They concern required declarations, inaccurate paths, effects that no requirement covers, and
+waivers.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -89,8 +90,8 @@ class JudgedMission:
     def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Booleans]]:
         """Yield the id of each waiver, with a mask of the cases in which it covers a row or a requirement.
 
-        The waivers are in the order of the file. With `row_id`, the mask marks only the cases in which the waiver
-        covers this row.
+        The waivers are in the order of the file. If `row_id` is given, the mask marks only the cases in which the
+        waiver covers this row.
         """
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
@@ -106,9 +107,9 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     Parameters
     ----------
     analysis : Analysis
-        Analysis of cases that need the same number of nodes.
+        Analysis of cases that need the same number of quadrature nodes over the aperture.
     today : date
-        Day on which waivers are judged, UTC.
+        Day (UTC) on which waivers are judged.
     """
     mission, cases = analysis.mission, analysis.cases
     judging = Judging(cases, mission.allocation.warn_above, analysis.is_complete)
@@ -194,7 +195,10 @@ def _families(
     random: RandomRows,
     scene: JudgedScene | None,
 ) -> Iterator[FamilyRow]:
-    """Yield all rows under one gating model, in the order of the JSON output."""
+    """Yield all rows, as judged by one model, in the order of the JSON output.
+
+    `model` is `published` or `full`.
+    """
     needs = analysis.mission.requirements
     yield from errors.rows(model)
     if vibrations is not None:
@@ -216,9 +220,9 @@ def _families(
 
 
 def _rows(model: str, families: Sequence[FamilyRow], cases: int) -> dict[str, Judged]:
-    """Collect the rows of one model by their ids; rows that exist in no case are omitted.
+    """Collect the rows of one model by their ids, and omit rows that do not exist in any case.
 
-    Different families may contain the same row in different cases. The parts are merged into one row.
+    Different families may contain the same row for different cases. These parts are merged into one row.
     """
     rows: dict[str, Judged] = {}
     by_model = np.full(cases, MODELS.index(model), np.int8)
@@ -237,7 +241,7 @@ def _rows(model: str, families: Sequence[FamilyRow], cases: int) -> dict[str, Ju
 
 
 def _has_vibration_rows(analysis: Analysis) -> bool:
-    """Whether a vibration is declared or the row of a vibration is shown."""
+    """Whether a vibration is declared, or the row of a vibration must be shown."""
     return (
         _vibrates(analysis.mission)
         or analysis.shown is None
@@ -257,10 +261,10 @@ def _undeclared(
     analysis: Analysis,
     in_doubt: Mapping[tuple[str, StateKind | None], Booleans],
 ) -> Iterator[Judged]:
-    """Yield rows for errors that no case declares.
+    """Yield rows for errors that are not declared in any case.
 
-    These are rows that are always shown, and rows of errors of paths that may be less accurate than declared.
-    `in_doubt` marks the cases with such a path, by platform and kind of error.
+    There are two kinds of such rows: rows that are always shown, and rows of path errors on platforms whose path may
+    be less accurate than declared. `in_doubt` marks the cases with such a path, for each platform and kind of error.
     """
     subjects = dict(analysis.shown or {})
     for (name, state), is_doubtful in in_doubt.items():
@@ -281,9 +285,10 @@ def _undeclared(
 
 
 def _has_noise(judging: Judging, analysis: Analysis) -> Booleans:
-    """Find the cases that declare an error that spreads power, or a tone that counts against the ISLR, (cases,).
+    """Find the cases that declare an error that spreads power over the image, (cases,).
 
-    A motion error spreads power if the part of its phase beyond the cubic term is not negligible.
+    Tones that count against the ISLR are included. A motion error spreads power if the part of its phase beyond the
+    cubic term is not negligible.
     """
     array, gates, cases = judging.array, analysis.gates, analysis.cases
     level = negligible_rad(analysis.mission)
@@ -324,7 +329,7 @@ def _worst(codes: Codes, floor: Codes) -> Codes:
 
 
 class RowStatuses:
-    """Statuses of rows, (rows, cases), with the reasons for changes that do not follow from a single row.
+    """Statuses of all rows, (rows, cases), and the reasons for changes that do not follow from a row alone.
 
     Each method sets some rows to `not_evaluated`. A row that fails keeps the status `fail`.
     """
@@ -344,10 +349,10 @@ class RowStatuses:
         self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
-        """Set rows to `not_evaluated` if their error must be declared but is not.
+        """Set rows to `not_evaluated` if their error must be declared but is not declared.
 
-        The first row stands for all required declarations. It becomes `not_evaluated` if any of them is missing, and
-        `pass` otherwise.
+        The first row represents all required declarations. It becomes `not_evaluated` if a declaration is missing,
+        and `pass` otherwise.
         """
         if not self.mission.requirements.declare:
             return
@@ -379,10 +384,10 @@ class RowStatuses:
                 self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Set rows to `not_evaluated` if they cause an effect that no requirement limits.
+        """Set rows to `not_evaluated` if their errors cause an effect that no requirement limits.
 
-        A row whose contribution to such an effect is negligible, and which passes only because it has no limit, gets
-        the status `info`.
+        A row gets the status `info` if its contribution to such an effect is negligible and it passes only because it
+        has no limit.
         """
         for row_index, row in enumerate(self.rows):
             row_id, status = row.subject.id, self.status[row_index]
@@ -402,19 +407,25 @@ class RowStatuses:
     def judge_place(self, is_misplaced: Booleans) -> None:
         """Set the row of the location requirement to `not_evaluated` where the displacement of the image is unknown.
 
-        It is unknown if an error displaces the image by an amount that no row limits.
+        The displacement is unknown if an error displaces the image by an amount that no row limits.
         """
         if self.mission.requirements.location_error is not None:
             rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
             self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
-        """Set rows to `not_evaluated` if they depend on a cause of error that lacks an entry in the mission file."""
+        """Set rows to `not_evaluated` if they depend on an incompletely declared cause of error.
+
+        Such a cause needs two entries of the mission file, of which only one is given.
+        """
         for half in halves:
             self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Booleans) -> None:
-        """Set the ISLR rows to `not_evaluated` in the cases in which nothing but a cubic phase contributes."""
+        """Set the ISLR rows to `not_evaluated` in the cases in which only a cubic phase contributes to the ISLR.
+
+        `has_noise` marks the cases with further contributions, (cases,).
+        """
         if not has_noise.all():
             rows = [row_subject.facts is SPREAD_POWER for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
@@ -428,7 +439,7 @@ class RowStatuses:
         """Find the first valid waiver that covers each broken row, (rows, cases).
 
         The result is the index of the waiver in the file, or -1 if no waiver covers the row. A row is broken if it
-        fails or is not evaluated.
+        fails or is not evaluated. `today` is the day (UTC) on which waivers must be valid.
         """
         indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
@@ -444,8 +455,8 @@ class RowStatuses:
     def judges(self) -> Codes:
         """Find the requirement against which each row is judged, (rows, cases), as an index in `REQUIREMENT_KEYS`.
 
-        The index is -1 for a row that is not judged against a requirement, and for a required error that is not
-        declared.
+        The index is -1 for a row that is not judged against a requirement. It is also -1 for a row whose error must
+        be declared but is not declared.
         """
         binding = np.array([row.binding for row in self.rows])
         metric = np.array(
@@ -466,7 +477,7 @@ class RowStatuses:
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
-    """Merge the rows of both models. For each row and case, the model with the stricter verdict is used.
+    """Merge the rows of both models by taking, for each row and case, the model with the stricter verdict.
 
     If both statuses are equal, the model with the higher utilization is used.
     """

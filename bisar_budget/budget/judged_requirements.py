@@ -1,16 +1,16 @@
-"""Judges each requirement from its rows, from effects that no requirement covers, and from the declared errors.
+"""Judgement of each requirement from its rows, from effects that no requirement covers, and from the declared errors.
 
 The exit code 0 of a check means that every requirement was judged and is met. Each effect of each declared error is
-judged once:
+judged against one requirement:
 
-- quadratic phase: by the quadratic requirement;
-- cubic phase: by the cubic requirement, or by ISLR without a cubic requirement;
-- power that spreads: by ISLR;
-- a tone: by PSLR, or by ISLR without a required PSLR;
-- displacement: by the location requirement.
+- quadratic phase: against the requirement on the quadratic phase;
+- cubic phase: against the requirement on the cubic phase, or against ISLR if there is no such requirement;
+- power that spreads over the image: against ISLR;
+- tone: against PSLR, or against ISLR if there is no requirement on PSLR;
+- displacement of the image: against the location requirement.
 
-An effect that no requirement covers is negligible if its total is below 0.08 rad and below a tenth of the quadratic
-requirement. Otherwise the rows that cause it are `not_evaluated`.
+An effect that no requirement covers is negligible if its total is below 0.08 rad and below a tenth of the limit on
+the quadratic phase. Otherwise the rows that cause the effect are `not_evaluated`.
 
 All numbers are arrays over n cases, (n,). The check of one mission is a single case.
 """
@@ -49,10 +49,10 @@ IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 class UntakenEffect(NamedTuple):
     """An effect that no requirement covers, for an array of cases, and the rows that cause it.
 
-    `total` is the effect of all errors together [rad]. `parts` maps row ids to the magnitude of each error's effect
-    [rad]. `is_negligible` marks the cases in which the total is small but not zero. `makers` maps row ids to masks of
-    the cases in which the total is large and the row is one of its causes. Each of these rows has an effect of at
-    least `least` [rad].
+    `effect` is `cubic`, `spread` or `tone`. `total` is the effect of all errors together [rad]. `parts` maps row ids
+    to the magnitude of each error's effect [rad]. `is_negligible` marks the cases in which the total is small but not
+    zero. `makers` maps row ids to masks of the cases in which the total is large and the row is one of its causes. A
+    row is such a cause if its effect is at least `least` [rad].
     """
 
     effect: str  # cubic, spread or tone
@@ -68,9 +68,9 @@ class RequirementState(NamedTuple):
 
     `decider` is the index of the row that decides the status, or -1. `user` is the index of the row that gives the
     `utilization` of the requirement, or -1. If the requirement is met, with or without a warning, `user` is the row
-    with the largest utilization. It may differ from `decider`: if only the second model gives a warning for a row,
-    that row decides the status, but its utilization may be smaller. `is_unjudged` marks the cases in which the
-    requirement cannot be judged, whether it is waived or not.
+    with the largest utilization. It may differ from `decider`. For example, a row may become a warning because of the
+    second model alone. It then decides the status, although its utilization need not be the largest. `is_unjudged`
+    marks the cases in which the requirement cannot be judged, whether it is waived or not.
     """
 
     key: str
@@ -85,7 +85,8 @@ class RequirementState(NamedTuple):
 def first_highest(uses: Floats) -> NDArray[np.intp]:
     """Index of the row with the highest utilization in each case, (cases,).
 
-    If several rows are equal except for rounding, the first of them is returned.
+    If several rows have the same utilization except for rounding, the first of them is returned. `uses` are the
+    utilizations (rows, cases).
     """
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
@@ -97,12 +98,15 @@ def is_as_high(uses: PerCase, other_uses: PerCase) -> Booleans:
 
 
 def negligible_rad(mission: Mission) -> PerCase:
-    """Total phase [rad] below which an effect that no requirement covers is negligible."""
+    """Total phase below which an effect that no requirement covers is negligible. [rad]"""
     return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
-    """List the keys of the requirements that a mission states, with the quadratic phase, which has a default."""
+    """List the keys of the requirements that a mission states.
+
+    The requirement on the quadratic phase is always included, because it has a default.
+    """
     needs = mission.requirements
     return tuple(
         key for key in REQUIREMENT_KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None)
@@ -137,8 +141,8 @@ def requirement_states(
         Index in `REQUIREMENT_KEYS` of the requirement against which each row is judged; -1 if there is no such
         requirement.
     quadratic_use : (rows, n)
-        Quadratic phase of each row divided by its limit, whichever requirement sets the allowable; NaN without such a
-        phase.
+        Quadratic phase of each row divided by the limit of this phase, even if another requirement sets the allowable
+        of the row; NaN for a row without a quadratic phase.
     waived : mapping of str to bool
         For each requirement key, whether a valid waiver names the requirement.
     before : (rows, n)
@@ -146,13 +150,14 @@ def requirement_states(
     in_doubt : (rows, n)
         Whether each row belongs to an oscillator whose true noise may differ from the computed noise.
     has_noise : (n,) bool
-        Whether an error that spreads power, or a tone that counts against the ISLR, is declared. Otherwise ISLR is
-        not judged.
+        Whether an error that spreads power over the image, or a tone that counts against the ISLR, is declared. If
+        there is no such error, ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row limits.
     unjudged : mapping of str to bool or (n,) bool
-        For each requirement key, whether the requirement is not evaluated. The reason is that it depends on delays
-        that are assumed to be constant over a long aperture, or on a cause of which the file states only one half.
+        For each requirement key, whether the requirement cannot be evaluated. This is so if it depends on atmospheric
+        delays that are assumed to be constant over a long aperture, or on a cause of error that needs two entries of
+        the file, of which only one is given.
     """
     uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]

@@ -1,4 +1,4 @@
-"""One row of the budget, judged for an array of cases, and the rules that judge it.
+"""One row of the budget, judged for an array of cases, and the rules by which it is judged.
 
 The check of one mission is a single case.
 """
@@ -60,12 +60,12 @@ IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # 
 
 
 def statuses(codes: Codes | np.int8) -> Any:
-    """Convert a status code to the name of the status, or an array of codes to an array of names."""
+    """Convert a status code to the name of the status, or convert an array of codes to an array of names."""
     return _STATUS_NAMES[codes]
 
 
 class Why(IntEnum):
-    """Reason for the status of a row, if the numbers of the row do not decide the status."""
+    """Reason for the status of a row, if this status does not follow from the numbers of the row."""
 
     OWN = 0  # no reason: the row's own numbers decide
     NOT_DECLARED_AS_REQUIRED = 1
@@ -80,8 +80,8 @@ class Why(IntEnum):
 class Judged(NamedTuple):
     """One row of the budget for an array of cases: its status codes (indices in `STATUS`) and its numbers, (cases,).
 
-    A number is NaN where it does not exist. The numbers from `allowable_published` on are computed only if
-    `Judging.is_complete` is set.
+    A number is NaN in the cases for which it is not defined. The numbers from `allowable_published` on are computed
+    only if `Judging.is_complete` is set.
     """
 
     subject: Subject
@@ -145,33 +145,42 @@ class Judged(NamedTuple):
         return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
-        """Return the row with the requirement `key` as its metric and as the requirement that sets its allowable."""
+        """Return the row with `key` as its metric and as the key of the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
     def allowable_by(self, model: str) -> Floats:
-        """Return the allowable under `model`, `published` or `full`, whether or not this is the gating model."""
+        """Return the allowable according to one model, even if this model does not judge the row.
+
+        `model` is `published` or `full`.
+        """
         return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
-        """Return the key of the requirement that sets the allowable in a case; None if the row's metric sets it."""
+        """Return the key of the requirement that sets the allowable in a case.
+
+        The result is None if this is the requirement on the row's own metric.
+        """
         requirement_index = self.binding[case.place]
         return None if requirement_index < 0 else REQUIREMENTS[requirement_index]
 
     def numbers(self, case: int) -> dict[str, float | None]:
-        """Return the numbers of the row in one case, by name; None where a number does not exist."""
+        """Return the numbers of the row in one case as a mapping from name to value.
+
+        A number that is NaN is returned as None. `case` is the index of the case.
+        """
         columns = [column.item(case) for column in _columns_of_numbers(self)]
         return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, columns, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
-        """Quadratic phase [rad] computed from exact ranges; NaN for a row that is not computed from exact ranges."""
+        """Quadratic phase computed from exact ranges; NaN for a row that is not computed from exact ranges. [rad]"""
         return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
         """Allowable divided by the declared size, minus one.
 
-        For a row in decibels, both are converted to amplitudes first.
+        For a row in decibels, both are converted to amplitudes before they are divided.
         """
         with np.errstate(all="ignore"):
             margin = 1 / self.utilization - 1
@@ -183,13 +192,13 @@ _ARRAY_FIELDS = tuple(name for name in Judged._fields if name not in ("subject",
 
 
 def decibels(amplitude: PerCase) -> Floats:
-    """Convert amplitude factors to levels [dB]; NaN for a factor that is not above 0."""
+    """Convert amplitude factors to levels; a factor that is zero, negative or NaN gives NaN. [dB]"""
     with np.errstate(all="ignore"):
         return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
 
 
 class Judging(NamedTuple):
-    """Settings for judging rows: the number of `cases`, and the utilization above which a warning is given.
+    """Settings for judging rows: the number of cases, and the utilization above which a warning is given.
 
     A utilization above `warn_above` turns a pass into a warning. If `is_complete` is set, all numbers of each row are
     computed. Otherwise only the numbers that decide the status are computed.
@@ -200,7 +209,7 @@ class Judging(NamedTuple):
     is_complete: bool = False
 
     def array(self, value: PerCase | None) -> Floats:
-        """Expand a number to an array with one value for each case, (cases,); NaN for None."""
+        """Expand a number to an array with one value for each case, (cases,); None becomes NaN."""
         return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
     def row(
@@ -265,7 +274,7 @@ class Judging(NamedTuple):
 # ---------------------------------------------------------------------- one case in words
 @dataclass(frozen=True, slots=True, eq=False)
 class FamilyRow(ABC):
-    """Base class of budget rows, each judged by one model for an array of cases.
+    """Base class of budget rows. Each row is judged by one model, for an array of cases.
 
     `judged` holds the status and the numbers of the row. `is_there` marks the cases in which the row exists.
     """
@@ -293,7 +302,10 @@ def worded(
     without_autofocus: float = 0.0,  # utilization without the gain of autofocus
     **more_fields: Any,  # further fields of the row
 ) -> Row:
-    """Build the report row for one case from a judged row and its wording. The wording does not change the status."""
+    """Build the report row for one case from a judged row and the notes for its text.
+
+    The notes do not change the status of the row.
+    """
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))

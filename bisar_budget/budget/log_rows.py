@@ -1,9 +1,9 @@
-"""The row for the residual of a log, if the file does not state which path the processor uses.
+"""Budget row for the residual of a log, if the file does not state which path the processor uses.
 
-The residual is the difference between the fixes of the log and the smooth path through them. For a processor that
-uses the fixes, the residual is a random error with a row of its own (`effects.navigation_errors`). For a processor
-that uses the smooth path, there is no residual. If the file does not state which path is used, the residual cannot be
-judged. The row of this module is then not evaluated, whatever the requirements are.
+The residual is the difference between the position fixes of the log and the smooth path fitted to them. For a
+processor that uses the fixes, the residual is a random error with a row of its own (`effects.navigation_errors`). For
+a processor that uses the smooth path, there is no residual. If the file does not state which path is used, the
+residual cannot be judged. The row of this module is then not evaluated, whatever the requirements are.
 """
 
 from collections.abc import Iterator
@@ -22,9 +22,10 @@ from bisar_budget.mission.model import Mission
 
 
 def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
-    """Yield the row for a residual that is too large, for each platform with a log.
+    """Yield the row for a log's residual that is too large, for each platform with such a log.
 
-    The row exists only in the cases in which the residual is too large.
+    The residual is the difference between the position fixes of the log and the smooth path fitted to them. The row
+    exists only in the cases in which the residual is too large.
     """
     for name in PLATFORMS:
         is_there = np.broadcast_to(leaves_unsaid(mission, name), (judging.cases,))
@@ -42,7 +43,9 @@ def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
 class UnsaidResidual(FamilyRow):
     """The row for the residual of a log, for an array of cases.
 
-    The reason for its status is the note on the doubt about the path.
+    The residual is the difference between the position fixes of the log and the smooth path fitted to them. The row
+    is not evaluated. The reason in the report is the note on the doubt whether the processor uses the fixes or the
+    smooth path.
     """
 
     def in_words(self, case: Case, model: str) -> Row:

@@ -103,7 +103,10 @@ def _is_high(mission: Mission, path: PlatformState) -> Booleans:
 
 
 def _is_along_orbit(mission: Mission, name: str) -> bool:
-    """Whether the file states errors of a platform in `ric`, where velocities are inertial only for orbits."""
+    """Whether the file states errors of a platform in the frame `ric`.
+
+    Velocity errors in this frame are inertial only for platforms on an orbit.
+    """
     error, common = getattr(mission.platforms, name).motion_error, mission.common_motion_error
     is_of_platform = error.frame == "ric" and any(error.stated(kind) is not None for kind in ("position", "velocity"))
     return is_of_platform or (common is not None and common.frame == "ric")

@@ -1,9 +1,9 @@
-"""Phase limits of tones between one and three cycles per aperture, in addition to the limit on their echoes.
+"""Limits on the phase errors that tones between one and three cycles per aperture cause in addition to echoes.
 
 Such a tone makes echoes. At its worst starting phase it also causes a quadratic and a cubic phase error. No sum of
-errors includes these phase errors, because PSLR or ISLR already limits the motion. Therefore the row of the tone
-itself limits them. The limit on the quadratic phase is the platform's share, including the autofocus gain. The limit
-on the cubic phase is the full requirement.
+errors includes these phase errors, because PSLR or ISLR already limits the tone. The row of the tone itself therefore
+limits them. The limit on the quadratic phase is the platform's share, including the autofocus gain. The limit on the
+cubic phase is the full requirement.
 """
 
 import math
@@ -25,9 +25,10 @@ from bisar_budget.phrases import NOTHING, Note
 class NearPhases(NamedTuple):
     """Phase errors [rad] that a slow tone causes at its worst starting phase, and their utilizations, (cases,).
 
-    The values are NaN for a tone that is too fast to cause such phase errors. `use` is the utilization of the
-    stricter limit, and `quadratic_use` is the utilization of the quadratic limit. `without_autofocus` is the
-    utilization of the quadratic limit without the autofocus gain; it is 0 for a tone that is too fast.
+    `use` is the larger utilization of the limits on the quadratic and the cubic phase, and `quadratic_use` is the
+    utilization of the limit on the quadratic phase. These values are NaN for a tone that is too fast to cause such
+    phase errors. `without_autofocus` is the utilization of the limit on the quadratic phase without the autofocus
+    gain; it is 0 for a tone that is too fast.
     """
 
     use: Floats
@@ -48,8 +49,9 @@ class NearPhases(NamedTuple):
     ) -> "NearPhases":
         """Compute the utilizations of a tone from the phase errors that it causes.
 
-        `owner` is the platform of the tone. `phases` are its quadratic, cubic, equal-loss and judged phase [rad].
-        `is_near` marks the cases in which the tone is slow enough to cause these phase errors.
+        `owner` is the platform of the tone. `phases` [rad] are its quadratic phase, its cubic phase, the quadratic
+        phase that would cause the same peak loss, and the judged phase, which is compared with the limit. `is_near`
+        marks the cases in which the tone is slow enough to cause these phase errors.
         """
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)
@@ -65,9 +67,9 @@ class NearPhases(NamedTuple):
         return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
-        """Size at which the phase errors of the tone reach the stricter limit, in the unit of `declared`.
+        """Size at which the phase errors of the tone reach the first of their limits, in the unit of `declared`.
 
-        It is infinite for a tone without such phase errors.
+        `declared` is the declared size of the tone. The result is infinite for a tone without such phase errors.
         """
         with np.errstate(all="ignore"):
             return np.where(self.use > 0, declared / self.use, math.inf)
@@ -85,9 +87,9 @@ class NearPhases(NamedTuple):
     ) -> Judged:
         """Judge a tone by its echoes and by its phase errors.
 
-        `by_echoes` is the size of the tone at which its echoes reach their requirement; None without such a
-        requirement. Where `is_unknown` is true, the level of the echoes is unknown. The tone then still fails if its
-        phase errors exceed a requirement.
+        `declared` is the declared size of the tone. `by_echoes` is the size at which its echoes reach the requirement
+        on PSLR or ISLR; it is None if there is no such requirement. Where `is_unknown` is true, the level of the
+        echoes is unknown, but the tone still fails if its phase errors exceed a requirement.
         """
         limit = self.limit(declared)
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
@@ -114,7 +116,10 @@ class NearPhases(NamedTuple):
 
 
 def phase_over(case: Case, judged: Judged) -> Note:
-    """Explain why a tone fails because of its phase errors; empty if no phase requirement sets its allowable."""
+    """Explain why a tone fails because of its phase errors.
+
+    The note is empty if no phase requirement sets the tone's allowable.
+    """
     mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
     binding = phase_requirement(case, judged)
     if binding is None:

@@ -1,8 +1,9 @@
-"""Rows of random errors (sensors, clocks, atmosphere), which limit their phase, displacement and spread power.
+"""Budget rows of random errors (sensors, clocks, atmosphere).
 
-Independent random errors add in power. The rule `allocation.combine` is for phases and does not apply to powers. Each
-platform's share of the ISLR requirement limits the sum of the powers spread by wideband vibration, sensor noise and
-phase noise.
+The rows limit the phase and the displacement of the image that these errors cause, and the power that they spread
+over the image. Independent random errors add in power. The rule `allocation.combine` is for phases and does not apply
+to powers. Each platform's share of the ISLR requirement limits the total power that wideband vibration, sensor noise
+and phase noise spread over the image.
 """
 
 import math
@@ -67,7 +68,8 @@ _CONVERGED_FRACTION = 0.3  # of an error at the start; with more at mid-aperture
 class Limits(NamedTuple):
     """Limits on the effects of a single error: phases [rad] and displacement of the image [m].
 
-    `spread` limits the rms phase that spreads power. A limit for which there is no requirement is None.
+    `spread` limits the rms phase of errors that spread power over the image. A limit is None if there is no
+    requirement for it.
     """
 
     quadratic: Any
@@ -77,7 +79,7 @@ class Limits(NamedTuple):
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: PerCase = 1.0) -> Limits:
-    """Return the limits that apply to a single error of `owner`, under one model.
+    """Return the limits that apply to a single error of an owner (platform, clock or mission) in one model.
 
     `gain` is the autofocus gain. It multiplies the limit on the quadratic phase.
     """
@@ -87,11 +89,11 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
 
 
 def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
-    """Return the effect with its phases converted to the quantities that the requirements limit.
+    """Return the effect of an error in terms of the quantities that the requirements limit.
 
-    The quadratic phase of the result is the judged phase for the autofocus gain `gain`. Without a cubic requirement,
-    the power of the cubic phase at one sigma is added to the power that spreads. `coverage` is the coverage factor
-    that `effect` includes.
+    The quadratic phase of the result is the judged phase, see `RandomEffect.judged`, for the autofocus gain `gain`.
+    If there is no requirement on the cubic phase, the power of the cubic phase at one sigma is added to the power
+    that spreads over the image. `coverage` is the coverage factor that `effect` includes.
     """
     effect = effect._replace(quadratic=effect.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
@@ -103,7 +105,7 @@ def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain:
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
     """Compute the sizes at which an error reaches each of its limits, in the order of `RANDOM_REQUIREMENTS`.
 
-    The sizes are in the unit of the error. They are infinite without a limit or without an effect.
+    The sizes are in the unit of the error. A size is infinite if there is no limit or no effect.
     """
     with np.errstate(all="ignore"):
         return [
@@ -129,7 +131,7 @@ class RandomRows:
         return table
 
     def _effects(self, model: str) -> RandomEffect:
-        """Compute the effects of each random error per unit of the error, with one model, (errors, cases)."""
+        """Compute the effects of each random error, per unit of the error, in one model, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
@@ -140,7 +142,7 @@ class RandomRows:
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
         """Compute the size at which each error reaches the limit of each requirement, (requirements, errors, cases).
 
-        The sizes are in the unit of the error. They are infinite without a requirement or without an effect.
+        The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect.
         """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
@@ -156,7 +158,7 @@ class RandomRows:
         return sizes
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
-        """Yield the rows of all random errors, declared or not, under one model, `published` or `full`."""
+        """Yield the rows of all random errors, declared or not, as judged by the model `published` or `full`."""
         if not self.errors:
             return
         other_model = OTHER_MODEL[model]
@@ -220,7 +222,11 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
-        """Mark the errors that depend on phase noise below the first point of a mask, (errors, cases)."""
+        """Mark the errors that depend on phase noise at frequencies below a phase-noise mask, (errors, cases).
+
+        `effects` are the effects per unit of each error. `sizes` are the sizes at which the errors reach their
+        limits, (requirements, errors, cases).
+        """
         rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
             for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
@@ -236,10 +242,10 @@ class RandomRows:
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
-        """Yield the rows for the total power spread by errors (ISLR), for each owner and for the mission.
+        """Yield the rows that limit the total power spread by errors (the ISLR), for each owner and for the mission.
 
-        In a case in which only wideband vibration and errors with a stated ISLR spread power, the rows of the owners
-        do not exist.
+        An owner is a platform or the clock. The rows of the owners are absent in a case in which only wideband
+        vibration and errors with a stated ISLR spread power.
         """
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
@@ -298,7 +304,7 @@ class RandomRows:
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
         """Yield a row for each error in `other_errors` for which the file states an ISLR.
 
-        Each of these errors may use the full requirement.
+        The limit in each row is the full requirement on ISLR.
         """
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
@@ -322,7 +328,7 @@ class RandomRows:
             )
 
     def _level(self, rms: Floats, model: str) -> Floats:
-        """Convert rms phases [rad] to ISLR [dB] with one model; NaN for a phase that is zero or missing."""
+        """Convert rms phases [rad] to the ISLR [dB] that they cause in one model; NaN for a phase of zero or NaN."""
         return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
 
 
@@ -330,8 +336,9 @@ class RandomRows:
 class RandomRow(FamilyRow):
     """The row of one random error, for an array of cases; `place` is the index of the error in the list of errors.
 
-    `is_over_other` marks the cases in which the error fails under the non-gating model. `bound_by_other` is the index
-    in `RANDOM_REQUIREMENTS` of the requirement that limits the error under this model.
+    `is_over_other` marks the cases in which the error would fail in the other model, which does not decide the status
+    of the row. `bound_by_other` is the index in `RANDOM_REQUIREMENTS` of the requirement that limits the error in the
+    other model.
     """
 
     place: int
@@ -457,7 +464,7 @@ class StatedRow(FamilyRow):
 
 
 def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
-    """Whether an error depends on a vibration spectrum that is missing from the file; ISLR is then not judged.
+    """Whether an error depends on a vibration spectrum that is missing from the file, so that ISLR is not judged.
 
     The result is a Boolean or an array (cases,).
     """
@@ -467,9 +474,9 @@ def _is_open(mission: Mission, error: RandomError) -> PerCaseFlag:
 
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
-    """Return the sigmas of the displacement east and north [m] that a declared error causes; None if unknown.
+    """Return the sigmas of the displacement east and north that a declared error causes; None if unknown. [m]
 
-    Both are multiplied by the coverage factor.
+    Both sigmas are multiplied by the coverage factor.
     """
     effect = error.effect(model)
     if error.declared is None or math.isnan(effect.displacement):
@@ -590,7 +597,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> _Wording:
 
 
 def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
-    """Yield a note on how much oscillator noise remains after synchronisation; no note without synchronisation."""
+    """Yield a note on how much oscillator noise remains after synchronisation, if the clocks are synchronised."""
     if sync is None:
         return
     if sync.interval is not None:
@@ -611,7 +618,7 @@ def _air_wording(mission: Mission, error: RandomError) -> _Wording:
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
-    """Explain why an error has no allowable: it has no effect, or no requirement limits its effects."""
+    """Explain why an error has no allowable: either it has no effect, or no requirement limits its effects."""
     effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
     does = [name for name, size in effects if size > 0]
     return phrases.note("no-requirement-limits", effects=does) if does else no_effect(mission, error)
@@ -689,10 +696,10 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Write a note that an oscillator's effect depends on noise below the first point of its mask.
+    """Write a note that an oscillator's effect depends on noise at frequencies below its phase-noise mask.
 
-    Several kinds of effect may depend on this noise. The note describes the kind with the largest fraction of it, and
-    is empty if no kind depends on it.
+    Several kinds of effect may depend on this noise. The note describes the kind to which the noise contributes the
+    largest fraction. It is empty if no kind depends on the noise.
     """
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
@@ -708,7 +715,10 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
-    """Write a note that an error fails under the non-gating model, with the limit that the error exceeds."""
+    """Write a note that an error fails in the model that does not judge it, with the limit that it exceeds.
+
+    `gating` is the model that judges the error, `published` or `full`.
+    """
     other_model, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:

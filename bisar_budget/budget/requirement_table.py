@@ -1,6 +1,6 @@
-"""Builds the report rows, and the report entries of requirements, for one case, with their text and numbers.
+"""Report rows and report entries of requirements for one case, with their text and numbers.
 
-An entry gives the limit of a requirement, the value that the mission reaches, and the row that decides its status.
+The entry of a requirement gives its limit, the value that the mission reaches, and the row that decides its status.
 """
 
 import math
@@ -93,8 +93,8 @@ def _declarations(case: Case, judged_row: Judged) -> Row:
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
     """Write a note that lists the required errors that the file does not declare.
 
-    Errors that the file does not mention come first. They are followed by errors that have no effect without a second
-    entry, which the file lacks, such as a lever arm without an attitude error.
+    Errors that the file does not mention come first. They are followed by errors for which the file gives only one of
+    two necessary entries, for example a lever arm without an attitude error.
     """
     halves = [
         phrases.not_declared_as_required(declaration.key, declaration.lacks)
@@ -108,7 +108,7 @@ def _declarations_missing(missing: Sequence[Missing]) -> Note:
 
 
 def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Note:
-    """Explain the status of a row if the numbers of the row do not decide it."""
+    """Explain the status of a row if this status does not follow from the numbers of the row."""
     mission, why = case.mission, Why(judged_row.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(judged_row.subject, each))
@@ -137,9 +137,9 @@ def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Not
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Explain why the image is displaced by an amount that no row limits; empty if no cause is found.
+    """Explain why errors displace the image by an amount that no row limits; empty if no cause is found.
 
-    Possible causes are clocks that are not set, and an inaccurate path.
+    Possible causes are clocks that were never set, and an inaccurate path.
     """
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
@@ -163,9 +163,9 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
 
 # ---------------------------------------------------------------------- requirements
 def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
-    """Build the report entries of all judged requirements of one case.
+    """Build the report entries of all judged requirements in one case.
 
-    `waived` holds the report rows of the case after waivers.
+    `waived` holds the report rows of the case, with waivers applied.
     """
     rows = {row.id: row for row in waived.rows}
     of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have the row
@@ -222,10 +222,10 @@ def _waivers(
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
-    """Return the value that the mission reaches for a requirement, in its unit; None if there is no such value.
+    """Return the value that the mission reaches for a requirement; None if there is no such value.
 
-    It is the value of the mission's row for this requirement. If the mission has no row for the quadratic phase, the
-    value is the largest quadratic phase of a single error [rad].
+    The value is the declared size in the mission's row for this requirement, in the unit of the requirement. If the
+    mission has no row for the quadratic phase, the value is the largest quadratic phase [rad] of a single error.
     """
     row_of_mission = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
     if row_of_mission is not None and key != DECLARE:
@@ -240,7 +240,10 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
-    """Return the share of a requirement to which a row is limited; None if the row may use the full requirement."""
+    """Return the share of a requirement that a row may use; None if the row may use the full requirement.
+
+    `key` is the key of the requirement. `utilization` is copied to the result.
+    """
     owner = _OWNERS_OF_ROWS.get(row.subject.kind)
     if key == QUADRATIC and owner is not None:
         return DecidingShare(
@@ -261,7 +264,8 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
     """Return the share of a requirement that is allotted to the owner of a row, and the value that the row reaches.
 
     The owner is a part of the system, such as a platform (`Subject.owner`). `key` is the key of the requirement. Both
-    numbers are in its unit, [rad] or [dB], without the autofocus gain. A number that is not available is None.
+    numbers are in the unit of the requirement, [rad] or [dB], and do not include the autofocus gain. A number that is
+    not available is None.
     """
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:

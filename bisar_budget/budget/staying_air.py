@@ -1,11 +1,11 @@
 """Doubts about atmospheric delays that are assumed to be constant over a long aperture.
 
-In apertures of one minute or longer, the atmosphere differs between the beginning and the end. A delay without
-`correlation_time` is treated as constant: it displaces the image, and its phase changes only with the elevation. This
-is only part of the true effect. Therefore the delays are also computed with a correlation time of ten minutes, as
-changing delays. A requirement is not evaluated if the changing delays would use more than a tenth of it, or would
-exceed it together with the declared errors. If the changing delays would cause an effect that no requirement covers
-and that is not negligible, the rows of these delays are not evaluated.
+During an aperture of one minute or longer, the atmosphere changes. A delay without `correlation_time` is nevertheless
+treated as constant: it displaces the image, and its phase changes only with the elevation. This is only part of the
+true effect. The effects are therefore computed a second time, for delays that change with a correlation time of ten
+minutes. A requirement is not evaluated if the changing delays would use more than a tenth of it, or would exceed it
+together with the declared errors. If the changing delays would cause an effect that no requirement covers and that is
+not negligible, the rows of these delays are not evaluated.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,10 +35,11 @@ AIR_CHANGES_IN_S = 600.0  # correlation time of the zenith delay that remains af
 
 
 class AirUse(NamedTuple):
-    """Effect that changing delays would have on one row, with its utilization of the row's limit, (cases,).
+    """Effect that changing atmospheric delays would have on one row, for an array of cases.
 
-    `size` is the effect: a phase or rms phase [rad], or a displacement [m]. `use` is the utilization. `is_doubted`
-    marks the cases in which no verdict may rely on the assumption of constant delays.
+    `size` is the effect: a phase or rms phase [rad], or a displacement of the image [m]. `use` is the utilization,
+    which is the effect divided by the limit of the row. `is_doubted` marks the cases in which the verdict must not
+    rely on the assumption of constant delays.
     """
 
     row_id: str
@@ -51,10 +52,10 @@ class AirUse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StayingAir:
-    """Effects that delays would have if they changed, although they are assumed to be constant over a long aperture.
+    """Effects of atmospheric delays that may change during a long aperture but are assumed to be constant.
 
-    `uses` maps row ids to the effect of the changing delays on the row. `untaken` lists the effects that no
-    requirement covers, computed with the changing delays. Both are empty if no case has such a delay.
+    `uses` maps row ids to the effect that changing delays would have on the row. `untaken` lists the effects that no
+    requirement covers, computed with changing delays. Both are empty if no case has such a delay.
     """
 
     errors: Sequence[RandomError] = ()
@@ -64,25 +65,28 @@ class StayingAir:
 
     @property
     def _delays(self) -> frozenset[str]:
-        """Ids of the rows of the single delays.
+        """Ids of the rows that each judge a single delay.
 
-        With `combine: each`, the quadratic requirement limits these rows directly. If another requirement sets the
-        allowable of such a row, the status of the row is not the status of the quadratic requirement.
+        With `combine: each`, the requirement on the quadratic phase limits these rows directly. However, if another
+        requirement sets the allowable of such a row, the status of the row does not give the status of the
+        requirement on the quadratic phase.
         """
         return frozenset(error.id for error in self.errors)
 
     def doubted_rows(self) -> dict[str, Booleans]:
-        """Return, for each row of a sum, a mask of the cases in which it is not evaluated, (cases,).
+        """Return, for each row of a sum, a mask of the cases in which the row cannot be evaluated, (cases,).
 
-        The masks are keyed by row id.
+        A row of a sum judges several errors together. It cannot be evaluated if its verdict depends on the assumption
+        of constant delays. The masks are keyed by row id.
         """
         return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
 
     def doubted_requirements(self) -> dict[str, Booleans]:
-        """Return, for each doubted requirement, a mask of the cases in which it is not evaluated, (cases,).
+        """Return, for each requirement, a mask of the cases in which the requirement cannot be evaluated, (cases,).
 
-        The masks are keyed by requirement. A doubt about a platform's share affects only the row of this share, not
-        the requirement.
+        A requirement cannot be evaluated if its verdict depends on the assumption of constant delays. The masks are
+        keyed by requirement. A doubt about a platform's share affects only the row of this share, not the
+        requirement.
         """
         doubted: dict[str, Booleans] = {}
         for use in self.uses.values():
@@ -102,9 +106,9 @@ class StayingAir:
         }
 
     def reason(self, case: Case, row_id: str) -> Note:
-        """Describe the effect of changing delays on a row in one case, and name the key to add to the file.
+        """Describe the effect that changing delays would have on a row in one case.
 
-        This key states how the delays change over time.
+        The note also names the key to add to the file, which specifies how the delays change over time.
         """
         use = self.uses.get(row_id)
         if use is not None:
@@ -112,7 +116,10 @@ class StayingAir:
         return self._says_of_untaken(case, row_id)
 
     def reason_of_requirement(self, case: Case, key: str) -> Note:
-        """Describe the effect that changing delays would have on a requirement; empty if no verdict depends on it."""
+        """Describe the effect that changing delays would have on a requirement.
+
+        The note is empty if the verdict on the requirement does not depend on whether the delays change.
+        """
         doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
         return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
 
@@ -160,7 +167,10 @@ class StayingAir:
 
 
 def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
-    """Compute the effects on rows that delays assumed constant over a long aperture would have if they changed."""
+    """Compute the effects that atmospheric delays would have on rows if they changed during a long aperture.
+
+    Only delays that the mission assumes to be constant are considered.
+    """
     mission, cases = analysis.mission, analysis.cases
     is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
     if mission.propagation is None or not is_long.any():
@@ -186,8 +196,8 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
 def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
     """Whether the verdict on a row depends on the assumption of constant delays, (cases,).
 
-    It does if changing delays would use more than a tenth of the limit, or would exceed it together with the declared
-    errors.
+    This is so if changing delays would use more than a tenth of the row's limit, or would exceed the limit together
+    with the declared errors.
     """
     rule = "rss" if use.key == ISLR else mission.allocation.combine
     together = combined((use.use, declared_use), rule)
@@ -195,7 +205,7 @@ def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Booleans:
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
-    """Yield the effect that changing delays would have on each row with a requirement, under one model."""
+    """Yield, for one model, the effect that changing delays would have on each row that a requirement limits."""
     mission, allocation = analysis.mission, analysis.allocation
     rule = mission.allocation.combine
     for key in RANDOM_REQUIREMENTS:
@@ -226,12 +236,11 @@ def _use(analysis: Analysis, row_id: str, key: str, size: PerCase, limit: PerCas
 
 
 def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCase:
-    """Compute the effect that the requirement `key` limits, for a delay that changes.
+    """Compute the effect of a changing delay that the requirement `key` limits.
 
-    The effect is a phase [rad] or a displacement [m].
-
-    The quadratic phase is the judged phase with autofocus. The displacement is only the part that the change of the
-    delay adds. It is the root of the difference between the squared displacements with and without the change.
+    The effect is a phase [rad] or a displacement of the image [m]. The quadratic phase is the judged phase, which
+    takes autofocus into account. The displacement is only the part that is added by the change of the delay. It is
+    the square root of the squared displacement with the change minus the squared displacement without the change.
     """
     effect = error.effect(model)
     judged_effect = held_effect(
@@ -251,10 +260,10 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
 
 
 def _keys(mission: Mission) -> list[str]:
-    """List the keys to add to the file so that it states how the delays change.
+    """List the keys to add to the file to specify how the delays change.
 
-    The list has one key if no leg has a correlation time, or if both legs have the same atmosphere. Otherwise it has
-    the key of the leg that lacks a correlation time.
+    The list has a single key for both legs of the path if neither has a correlation time, or if both legs have the
+    same atmosphere. Otherwise it has the key of the leg that lacks a correlation time.
     """
     propagation = mission.propagation
     if propagation is None:

@@ -39,8 +39,8 @@ SENSITIVITY = "acceleration_sensitivity"
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
     """Judge the highest echo that all tones together can make, with the worst combination of their starting phases.
 
-    Both models derive this row from first principles, because shares according to the paper's rule would be 3 dB
-    stricter. Tones that are at most 2.5 cycles per aperture apart raise each other's echo, even if they come from
+    The row is derived from first principles in both models, because the paper's rule for the shares would be 3 dB
+    stricter. Tones that are at most 2.5 cycles per aperture apart raise each other's echoes, even if they come from
     different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
@@ -57,7 +57,7 @@ def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "Psl
 class PslrRow(FamilyRow):
     """The row for the highest echo of all tones together, for an array of cases.
 
-    The row exists only for missions with a required PSLR.
+    The row exists only for missions with a requirement on PSLR.
     """
 
     tones: Sequence[Tone]
@@ -86,9 +86,10 @@ class PslrRow(FamilyRow):
 
 # ---------------------------------------------------------------------- spurs
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Yield the rows of the oscillators' spurs under one model.
+    """Yield the rows of the oscillators' spurs, as judged by one model.
 
-    Like vibrations, spurs make paired echoes. The sizes are levels of the echo relative to the response [dB].
+    Like vibrations, spurs make paired echoes. The size in a row is the level [dB] of the echo relative to the impulse
+    response.
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
@@ -130,8 +131,9 @@ def _is_used(size: PerCase, limit: PerCase) -> Booleans:
 class SpurRow(FamilyRow):
     """The row of one spur of an oscillator, for an array of cases.
 
-    The size of the row is the level of the spur's echo relative to the response [dB]. `spur_index` is the index of
-    the spur. `is_over_other` marks the cases in which the row fails under the non-gating model.
+    The size of the row is the level [dB] of the spur's echo relative to the impulse response. `spur_index` is the
+    index of the spur. `is_over_other` marks the cases in which the row would fail in the other model, which does not
+    decide its status.
     """
 
     spur_index: int
@@ -186,10 +188,10 @@ class SpurRow(FamilyRow):
 
 
 def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
-    """Write a note that the part of a tone below one cycle per aperture is judged in the row `row_id`.
+    """Write a note that the low-frequency part of a folded tone is judged in the row `row_id`.
 
-    Synchronisation by an exchange of pulses folds (aliases) a tone to low frequencies. The result is empty if no part
-    of the tone is folded to less than one cycle per aperture.
+    Synchronisation by an exchange of pulses folds (aliases) a tone to low frequencies. The note is about the part of
+    the tone below one cycle per aperture. The result is empty if there is no such part.
     """
     slow = [
         (float(share), float(frequency))
@@ -215,9 +217,9 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
 def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
-    """Yield the rows of the vibration tones that act on oscillators, under one model.
+    """Yield the rows of the vibration tones that act on oscillators, as judged by one model.
 
-    The allowable is an acceleration sensitivity [s²/m]. A tone below one cycle per aperture causes quadratic and
+    The allowable is an acceleration sensitivity [s²/m]. A tone below one cycle per aperture causes a quadratic and a
     cubic phase instead of echoes. Such a tone is part of the row of the oscillator's random vibration.
     """
     mission = analysis.mission
@@ -256,7 +258,8 @@ class AcceleratedRow(FamilyRow):
     """The row of one tone that an oscillator feels as an acceleration, for an array of cases.
 
     `is_there` marks the cases in which the tone is fast enough for this row. `tone_index` is the index of the tone in
-    `accelerated_tones`. `is_over_other` marks the cases in which the row fails under the non-gating model.
+    `accelerated_tones`. `is_over_other` marks the cases in which the row would fail in the other model, which does
+    not decide its status.
     """
 
     tone_index: int
@@ -307,10 +310,11 @@ class AcceleratedRow(FamilyRow):
 
 
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
-    """Quadratic and cubic phase [rad] of a folded tone, from its parts below three cycles per aperture.
+    """Quadratic and cubic phase of a folded tone, from its parts below three cycles per aperture. [rad]
 
-    Each part is taken at its worst starting phase, and the phases of all parts are added. `free` is the peak phase of
-    the tone without synchronisation [rad].
+    The parts are the frequencies to which synchronisation by an exchange of pulses folds (aliases) the tone. Each
+    part is taken at its worst starting phase, and the phases of all parts are added. `free` [rad] is the peak phase
+    of the tone without synchronisation.
     """
     qpe: PerCase = 0.0
     cubic: PerCase = 0.0
@@ -328,7 +332,7 @@ def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[
 
 
 def evidence(oscillator: Oscillator) -> str | None:
-    """Return the origin of an oscillator's acceleration sensitivity: its catalogue part, or else its `source`."""
+    """Return the source of an oscillator's acceleration sensitivity: its catalogue part, or else its `source`."""
     return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
 
 
@@ -346,8 +350,8 @@ def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     """Return the notes on the row of an oscillator's acceleration sensitivity.
 
-    They state which vibration the oscillator is assumed to feel, which tones have rows of their own, and what remains
-    after synchronisation.
+    They state which vibration the oscillator is assumed to feel, which tones have rows of their own, and how much of
+    the vibration's effect remains after synchronisation.
     """
     felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator

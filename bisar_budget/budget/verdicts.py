@@ -1,4 +1,4 @@
-"""Adds verdicts that were obtained from simulated images to the rows of a check, and selects the verdicts to show."""
+"""Addition of verdicts from simulated images to the rows of a check, and selection of the verdicts to show."""
 
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -19,10 +19,10 @@ _SHOWN_ROWS = 4  # largest number of rows shown for a mission
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
     """Add the verdicts from simulated images to the findings of a check.
 
-    If an image refutes the limit of a declared row, the row fails, and so does its requirement. A row that passes
-    only with autofocus also fails if the image refutes the autofocus. If the file does not declare the error of a
-    row, the row only reports that its limit is refuted. A warning is given if an image refutes a limit for which the
-    check has no row, or if no image gave a verdict.
+    If an image refutes the limit of a row whose error is declared, the row fails, and so does its requirement. A row
+    that passes only with autofocus also fails if an image shows that autofocus does not work. If the error of a row
+    is not declared, the row only reports that its limit is refuted. A warning is given if an image refutes a limit
+    for which the check has no row, or if no image gave a verdict.
 
     Parameters
     ----------
@@ -106,9 +106,9 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
 def _is_gate(row: Row) -> bool:
     """Whether a row must fail if an image refutes its limit.
 
-    It must fail if it uses the limit and does not already fail. There are two exceptions. A row that only converts an
-    error from another frame to the scene's axes does not fail. The row of the pull-in range of autofocus does not
-    fail either, because it is not a requirement: if the range is stated too large, the gain is used only up to the
+    This is so for each row that has a declared error and does not fail already, with two exceptions. The first is a
+    row that only converts an error from another frame to the scene's axes. The second is the row of the pull-in range
+    of autofocus, because this range is not a requirement: if it is stated too large, the gain is used only up to the
     limit that range walk sets.
     """
     return (
@@ -122,10 +122,10 @@ def _is_gate(row: Row) -> bool:
 def _with_refuted(
     requirement: JudgedRequirement, refuted: Sequence[Row], waivers: tuple[AppliedWaiver, ...]
 ) -> JudgedRequirement:
-    """Return the requirement with the status of its worst refuted row, if that status is worse than its own.
+    """Return the requirement with the status of its worst refuted row, if that status is worse than the present one.
 
-    A row is refuted if an image contradicts its limit. The rows that determine the verdict on the requirement are
-    considered, and the rows whose limit follows from the requirement.
+    A row is refuted if an image contradicts its limit. Two kinds of refuted rows are considered: rows that determine
+    the verdict on the requirement, and rows whose limit follows from the requirement.
     """
     judges = [
         row
@@ -163,8 +163,9 @@ def _shown(verdict: Verdict) -> str:
 def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
     """Select the most important verdicts with a measured quadratic phase.
 
-    The rows with the worst status come first, and among them those with refuted limits. A row without a declared
-    error is selected only if its limit is refuted, or if there is no other row.
+    The verdicts on the rows with the worst status come first. Among rows with the same status, rows with refuted
+    limits come first. A row without a declared error is selected only if its limit is refuted, or if there is no
+    other row.
     """
     rows = {row.id: row for row in findings.rows}
     measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]

@@ -1,4 +1,4 @@
-"""Budget rows for platform vibration: single sinusoids (lines), groups of neighbouring lines, and wideband noise."""
+"""Budget rows for platform vibration: single sinusoids (spectral lines), groups of neighbouring lines, and noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -77,7 +77,7 @@ class Vibrations:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
     def rows(self, model: str) -> Iterator["VibrationRow"]:
-        """Yield all vibration rows under one model, in the order of the JSON output.
+        """Yield all vibration rows, as judged by one model, in the order of the JSON output.
 
         `model` is `published` or `full`. A platform without declared lines gets a single row for lines, with the
         status `not_declared`. A line with less than one cycle per aperture in only some of the cases gets two rows:
@@ -147,10 +147,11 @@ class Vibrations:
         return judged._replace(allowable_published=published, allowable_full=full)
 
     def _line(self, model: str, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """Build the row of a line with one or more cycles per aperture.
+        """Build the row of a vibration line with one or more cycles per aperture.
 
-        If the PSLR limits the line, the level of its echoes is compared with the limit; if the ISLR does, the power
-        of its echoes. Below three cycles per aperture, the quadratic and cubic phase of the line are limited as well.
+        If PSLR limits the line, the level of its echoes is compared with the limit. If ISLR limits the line, the
+        power of its echoes is compared with the limit. Below three cycles per aperture, the quadratic and cubic phase
+        of the line are limited as well.
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
@@ -181,11 +182,11 @@ class Vibrations:
         )
 
     def _slow(self, name: str, index: int, is_there: Booleans) -> "VibrationRow":
-        """Build the row of a line with less than one cycle per aperture.
+        """Build the row of a vibration line with less than one cycle per aperture.
 
         The quadratic and cubic phase of the line are compared with their limits. For a vibration along three axes,
-        the declared size in the row is an amplitude along the line of sight that has the same utilization as the
-        vibration.
+        the declared size in the row is the amplitude of a vibration along the line of sight that has the same
+        utilization.
         """
         row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[row_subject.id]
@@ -224,9 +225,9 @@ class Vibrations:
         )
 
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
-        """Yield the rows of groups of lines whose frequencies are so close that their echoes add.
+        """Yield the rows of groups of vibration lines whose frequencies are so close that their echoes add.
 
-        The size in each row is the amplitude [m] of a single line whose echo is as high as that of the group.
+        The size in each row is the amplitude [m] of a single line whose echo is as high as the echo of the group.
         """
         for index, (members, amplitude) in enumerate(self._near[name]):
             row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
@@ -234,11 +235,12 @@ class Vibrations:
             yield self._row(model, row_subject, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
     def _of_both_platforms(self) -> dict[str, Floats]:
-        """Compute the peak phases [rad] of single lines that replace groups of neighbouring lines of both platforms.
+        """Compute the peak phases of single lines that are equivalent to groups of lines of both platforms. [rad]
 
-        A single line has the same echo as its group, whose echoes add with their worst starting phases. The value is
-        given for each line of each platform, (lines, cases). It is NaN without a neighbouring line of the other
-        platform, without an amplitude, or without a required PSLR.
+        A group consists of vibration lines with neighbouring frequencies, whose echoes add with their worst starting
+        phases. The equivalent single line has an echo of the same height. The result gives, for each line of each
+        platform, the peak phase of the equivalent line, (lines, cases). It is NaN if the line has no neighbour on the
+        other platform, if the group has no amplitude, or if there is no requirement on PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (
@@ -253,9 +255,10 @@ class Vibrations:
 
 
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Booleans, Floats]]:
-    """Yield each group of neighbouring lines, with the amplitude [m] of a single line that has an equally high echo.
+    """Yield each group of neighbouring lines, and the amplitude of a single line with an equally high echo. [m]
 
-    A group is a mask, (lines, cases). The amplitude, (cases,), is 0 in the cases in which the group has no line.
+    A group is a mask of the lines that belong to it, (lines, cases). The amplitude, (cases,), is 0 in the cases in
+    which the group has no line. `cycles` are the cycles per aperture of all lines.
     """
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
@@ -271,8 +274,8 @@ class VibrationRow(FamilyRow):
 
     `members` marks the lines of a group. `qpe` and `cubic` are the quadratic and cubic phase [rad] of a motion below
     three cycles per aperture, at its worst starting phase. If `is_slow` is set, only these phases have limits;
-    otherwise the echoes of the motion have a limit too. `is_over_other` marks the cases in which the row fails under
-    the model that is not the gating model.
+    otherwise the echoes of the motion have a limit too. `is_over_other` marks the cases in which the row would fail
+    in the other model, which does not decide its status.
 
     If lines of both platforms are neighbours, their echoes add. `both` is the peak phase [rad] of a single line with
     an echo as high as the sum of these echoes. `level` is the level of that echo [dB], and `is_over_both` marks the
@@ -367,7 +370,7 @@ def _row(
     more: Sequence[Note] = (),
     doubt: Note = NOTHING,
 ) -> Row:
-    """Build the report row of a line, a group of lines or noise whose echoes or spread power are limited.
+    """Build the report row of a line, a group of lines or noise, with a limit on its echoes or its spread power.
 
     `key` is the key of the declared value below `vibration`. In the report, `notes` come before the notes on the
     limit of the row, and `more` after them.

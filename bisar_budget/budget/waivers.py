@@ -1,7 +1,7 @@
-"""Applies waivers to rows and requirements, and lists influences on the verdict from outside the mission file.
+"""Application of waivers to rows and requirements, and list of outside influences on the verdict.
 
-Valid, expired and unused waivers are listed in the findings, and so are the options, settings, environment variables
-and project catalogue parts that affect the verdict.
+Valid, expired and unused waivers are listed in the findings. The options, settings, environment variables and project
+catalogue parts that affect the verdict from outside the mission file are listed too.
 """
 
 import os
@@ -42,8 +42,8 @@ class Waived(NamedTuple):
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
         """Yield a warning for each waiver that has no effect, and for each waiver that covers every row.
 
-        A waiver has no effect if it names no row, or only rows that are not broken. A row is broken if it fails or is
-        not evaluated. A waiver that names a broken requirement has an effect.
+        A waiver has an effect if at least one of the rows or requirements that it names is broken. A row is broken if
+        it fails or is not evaluated.
         """
         broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
         ids = [requirement.id for requirement in judged]
@@ -59,7 +59,7 @@ class Waived(NamedTuple):
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
-    """Apply valid waivers to the rows that they name and that fail or are not evaluated.
+    """Apply each valid waiver to the rows that it names, if they fail or are not evaluated.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
     mission : Mission
         Mission with the waivers.
     today : date
-        Current day, UTC. A waiver is valid through its last day.
+        Current day (UTC). A waiver is valid through its last day.
     """
     ids = [row.id for row in rows]
     broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
@@ -107,7 +107,7 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
 
 
 def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
-    """Index, in the mission file, of the first valid waiver that names any of the ids; -1 if there is none."""
+    """Index, in the mission file, of the first valid waiver that names one of the ids; -1 if there is none."""
     valid = (
         waiver_index
         for waiver_index, waiver in enumerate(mission.waivers)
@@ -135,11 +135,11 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
     Parameters
     ----------
     mission : Mission
-        Mission as loaded, with the options that changed it and the catalogue parts that it uses.
+        Mission as loaded from its file, with the options that changed it and the catalogue parts that it uses.
     outside : Outside
-        Influences on all missions of the run.
+        Influences from outside the mission files that affect all missions of the run.
     today : date
-        Day on which waivers are judged, UTC. It affects the verdict if the file has a waiver.
+        Day (UTC) on which waivers are judged. It affects the verdict if the file has a waiver.
     """
     from_outside = list(outside.options)
     if mission.waivers or outside.is_day_given:
@@ -152,7 +152,7 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
 
 
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
-    """Yield an entry for each orbit that the file states as planned.
+    """Yield an entry for each orbit that the mission file declares as planned.
 
     The platform is then assumed to follow the planned orbit. Neither the age of the orbit nor its interpolation
     affects the verdict.
@@ -164,7 +164,7 @@ def _planned_orbits(mission: Mission) -> Iterator[Override]:
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:
-    """Yield an entry for each part file of the project that replaces a catalogue part of the same name."""
+    """Yield an entry for each part file of the user's project that replaces a catalogue part of the same name."""
     catalogue = str(resource("specs", "sensors")) if mission.parts else ""
     for name, file, _ in mission.parts:
         if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
@@ -176,7 +176,10 @@ def _own_parts(mission: Mission) -> Iterator[Override]:
 
 
 def _shown(file: str, mission_file: str) -> str:
-    """Path of a file relative to the folder of the mission file, so that it does not depend on the current folder."""
+    """Path of a file relative to the folder of the mission file.
+
+    This path does not depend on the current folder.
+    """
     try:
         path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
     except (OSError, ValueError):  # the current folder no longer exists, or the file is on another drive

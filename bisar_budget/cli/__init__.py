@@ -1,4 +1,7 @@
-"""Entry point of the `bisar-budget` command; modules that take long to import are imported only where used."""
+"""Entry point of the `bisar-budget` command.
+
+Modules that take long to import are imported only where they are used.
+"""
 
 import errno
 import gc
@@ -40,9 +43,9 @@ _FRUGAL = ("init", "schema")  # commands that do not use NumPy
 
 
 class _Commands(click.Group):
-    """A command group that imports each command at its first use, and exits with 3 if a command crashes.
+    """A command group that imports each command at its first use, and exits with code 3 if a command crashes.
 
-    Python would exit with 1 after a crash, but here 1 means that a requirement is broken or not judged.
+    Python would exit with code 1 after a crash, but here this code means that a requirement is broken or not judged.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -104,9 +107,9 @@ class _Commands(click.Group):
 
 
 def _own_fault(error: BaseException) -> NoReturn:
-    """Report a crash of the program and exit with 3, or report exhausted memory and exit with 2.
+    """Report a crash of the program and exit with code 3, or report exhausted memory and exit with code 2.
 
-    If the variable BISAR_BUDGET_DEBUG is set, the traceback is written too.
+    If the environment variable BISAR_BUDGET_DEBUG is set, the traceback is written too.
     """
     if os.environ.get("BISAR_BUDGET_DEBUG"):
         import traceback
@@ -138,8 +141,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command-line program.
 
-    After SIGTERM or SIGHUP the program exits without leaving worker processes or temporary files. Library warnings
-    are ignored, because users cannot fix them and PYTHONWARNINGS could turn them into errors.
+    After SIGTERM or SIGHUP the program exits without leaving worker processes or temporary files. Warnings from
+    libraries are ignored, because users cannot fix their causes, and PYTHONWARNINGS could turn the warnings into
+    errors.
     """
     warnings.simplefilter("ignore")
     # Workers start as `python -c`, which would import from the current folder, unlike an installed command.

@@ -1,4 +1,4 @@
-"""`bisar-budget allocate`: specifications for errors with which the mission meets every requirement."""
+"""`bisar-budget allocate`: error sizes to specify, so that the mission meets every requirement."""
 
 import math
 import os
@@ -101,7 +101,7 @@ def allocate(
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
-    """Write a mission file whose errors have the specified sizes, and which repeats them under `specifications`.
+    """Write a mission file in which the errors have the specified sizes, which are repeated under `specifications`.
 
     Nothing is written if there are no specifications, or if the new text would not be a valid mission file.
     """

@@ -61,9 +61,10 @@ _OF_RUN = ("format", "color")  # settings of a whole run, if all its projects ag
 
 
 class _Gate(click.Command):
-    """Command class of `check`: options default to environment variables, or else to the settings of a mission.
+    """Command class of `check`, which takes defaults of options from environment variables and project settings.
 
-    The settings of a mission are in the `pyproject.toml` nearest to it.
+    An environment variable takes precedence over the settings. The settings of a mission are in the `pyproject.toml`
+    nearest to it.
     """
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
@@ -92,8 +93,8 @@ class _Gate(click.Command):
     def _common_defaults(self, settings: "Sequence[Settings | None]") -> JsonObject:
         """Return option defaults for a run with several projects, from the settings of these projects.
 
-        Only the options in `_OF_RUN` that have the same value in all settings get a default. A warning is written for
-        each of the remaining options.
+        Only the options in `_OF_RUN` can get a default. The value of such an option must be the same in all settings;
+        otherwise a warning is written, and the option gets no default.
         """
         agreed = {}
         for key in _OF_RUN:
@@ -147,7 +148,10 @@ class _Gate(click.Command):
 
 
 def _touched(changed: Sequence[str]) -> list[str]:
-    """List the missions that the changed files affect; if there are none, write a message and exit with code 0."""
+    """List the missions that the changed files affect; if there are none, write a message and exit with code 0.
+
+    A mission is affected if its own file, or a file that it reads, has changed.
+    """
     from bisar_budget.cli.touched import touched_missions
 
     files = touched_missions(changed)
@@ -160,7 +164,7 @@ def _touched(changed: Sequence[str]) -> list[str]:
 def _hold_below(folder: str, report: str) -> None:
     """Raise `click.UsageError` if settings name a report file outside the folder of the settings file.
 
-    Otherwise a check of missions from another author could write to any folder of the user.
+    Without this test, the settings of another author's missions could make a check write to any folder of the user.
     """
     inside = os.path.join(os.path.realpath(folder), "")
     # A NUL in the name is reported when the report is written.
@@ -307,9 +311,9 @@ def check(
 ) -> None:
     """Check mission files against their requirements.
 
-    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 every requirement is judged and
-    met, or waived, 1 a requirement is broken or not judged, 2 wrong usage or an unusable mission file, 3 a fault of
-    the tool.
+    MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 if every requirement is either
+    waived, or judged and met; 1 if a requirement is broken or not judged; 2 for wrong usage or an unusable mission
+    file; 3 for a fault of the tool itself.
 
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the pyproject.toml nearest to each mission, overridden by the variables BISAR_BUDGET_FORMAT
@@ -391,7 +395,7 @@ def check(
             found |= zip(project.files, results_of_project, strict=True)
 
         def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
-            """Make the report on the mission files `its_files`, with the options of their projects `of`."""
+            """Make the report on the mission files `its_files`, using the options of their projects `of`."""
             its_missions = tuple(found[file] for file in its_files)
             # The day is reported only if it was given or decides a waiver, so that other reports are reproducible.
             is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
@@ -417,7 +421,11 @@ def check(
 
 
 def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
-    """Exit code for the missions of a project, from their statuses and the project's `strict` and `exit_zero`."""
+    """Return the exit code for the missions of a project.
+
+    It follows from the statuses of the missions, and from the options `strict` and `exit_zero` of the project.
+    `statuses` holds a set of statuses for each mission.
+    """
     from bisar_budget.findings.status import exit_code
 
     strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
@@ -426,7 +434,7 @@ def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
 
 
 def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
-    """List the reports that the settings of projects request: project, file name and format of each report.
+    """List the reports that the settings of the projects request, as tuples of project, file name and format.
 
     Such a report contains only the missions of its project.
     """
@@ -443,7 +451,8 @@ def _asked(
 ) -> tuple[date, Arguments]:
     """Return the day on which waivers are judged, and the arguments for the check of a project's missions.
 
-    If `is_among_others`, the run has several projects, and the arguments also record the settings file of this one.
+    If `is_among_others` is true, the run has several projects, and the arguments then also record the settings file
+    of this project.
     """
     from bisar_budget.findings.requirement import Override
 
@@ -491,9 +500,9 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
 
 
 def _check_draws(context: click.Context, scheduler: str | None) -> None:
-    """Raise `click.UsageError` for `--seed` or `--scheduler` without `--monte-carlo`, or for too many draws.
+    """Raise `click.UsageError` if the options for Monte Carlo draws are inconsistent.
 
-    More than `MAX_LOCAL_DRAWS` draws need a scheduler.
+    `--seed` and `--scheduler` need `--monte-carlo`, and more than `MAX_LOCAL_DRAWS` draws need a scheduler.
     """
     draws, seed = context.params["draws"], context.params["seed"]
     if draws is None:
@@ -568,7 +577,10 @@ def _explain(
 
 
 def _format_of(name: str) -> str:
-    """Name of the report format that belongs to the suffix of a file name; an unknown suffix is wrong usage."""
+    """Return the report format that belongs to the suffix of a file name.
+
+    Raises `click.UsageError` if the suffix is unknown.
+    """
     from bisar_budget.report import format_of
 
     format_name = format_of(name)
@@ -579,12 +591,18 @@ def _format_of(name: str) -> str:
 
 
 def _step_summary(format_name: str) -> str | None:
-    """Path of the summary file of a GitHub Actions run; None outside GitHub, or if the format is not `github`."""
+    """Path of the summary file of a GitHub Actions run, or None if no summary is to be written.
+
+    The result is None outside GitHub Actions, or if the format is not `github`.
+    """
     return (os.environ.get("GITHUB_STEP_SUMMARY") or None) if format_name == "github" else None
 
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
-    """Append the summary of a report to the summary file of a GitHub Actions run; only warn if this fails."""
+    """Append the summary of a report to the summary file of a GitHub Actions run.
+
+    If the file cannot be written, only a warning is given.
+    """
     from bisar_budget.report.formats.annotations import step_summary
 
     try:
@@ -624,9 +642,9 @@ def _write_report(path: str, format_name: str, report: "Report", style: "Style")
 
 
 def _folder_of_pictures(path: str, format_name: str) -> str:
-    """Folder for the pictures of the report `path`, next to it; empty if the format has no pictures.
+    """Path of the folder for the pictures of the report `path`, beside the report.
 
-    Also empty if the report is not written to a regular file.
+    The result is empty if the format has no pictures, or if the report is not written to a regular file.
     """
     if not FORMATS[format_name].has_pictures or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
         return ""

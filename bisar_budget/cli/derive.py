@@ -1,4 +1,4 @@
-"""`bisar-budget derive`: the tables of Rigling & Moses, derived from geometry, and files generated from them."""
+"""`bisar-budget derive`: the tables of Rigling & Moses, derived from the geometry, and files generated from them."""
 
 import sys
 

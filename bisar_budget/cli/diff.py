@@ -1,4 +1,4 @@
-"""`bisar-budget diff`: the effect of a change to a mission on every margin."""
+"""`bisar-budget diff`: the effect that a change of a mission has on every margin."""
 
 import os
 import sys
@@ -124,7 +124,11 @@ def diff(
 def _with_files(
     files: Sequence[str], changes: "tuple[SetValue, ...]", output: str | None, today: datetime | None
 ) -> "ChangeSet":
-    """Compare two mission files; if `changes` are given, compare each mission file with itself after the changes."""
+    """Compare two mission files, or compare mission files with themselves after changes.
+
+    If `changes` is empty, `files` are two files, the first of which is the earlier version. Otherwise each file is
+    compared with itself after the changes are applied.
+    """
     from bisar_budget.mission.load import load_mission
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
 
@@ -148,8 +152,8 @@ def _with_files(
 def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
     """Compare mission files with their versions in the Git revision `base`.
 
-    The patterns are applied both to the files on disk and to those of the revision, so that new and removed mission
-    files are found too.
+    The patterns are applied both to the files on disk and to the files in the revision, so that new and removed
+    mission files are found too.
     """
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.revision import Revision, RevisionError, mission_at
@@ -192,9 +196,10 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
 
 
 def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
-    """Compare each mission in `before` with its counterpart in `after`; both contain functions that read missions.
+    """Compare each mission in `before` with its counterpart in `after`.
 
-    If a mission cannot be used, the faults of all missions are written, and the command ends.
+    Both are sequences of functions, each of which reads one mission. If a mission is unusable, the faults of all
+    missions are written, and the command ends.
     """
     from bisar_budget.questions.checks import check
     from bisar_budget.report.change.comparison import compare
@@ -206,7 +211,10 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
 
 
 def _settings(mission: str, files: Files = DISK) -> "SettingValues":
-    """Values of the settings nearest to a mission file, from disk or a Git revision; empty if there are none."""
+    """Return the values of the settings nearest to a mission file; empty if there are no settings.
+
+    `files` reads the settings from disk or from a Git revision.
+    """
     from bisar_budget.settings import TABLE
 
     settings = settings_here(files, None if mission == "-" else folder_of_file(mission))

@@ -1,4 +1,4 @@
-"""`bisar-budget verify` and `simulate`: images with errors at the limits, and with the declared errors."""
+"""`bisar-budget verify` and `simulate`: simulated images with errors at their limits, or with the declared errors."""
 
 import sys
 from collections.abc import Sequence

@@ -48,9 +48,10 @@ def init(file: str, name: str, force: bool) -> None:
 @click.option("--part", "is_of_part", is_flag=True, help="Of the file of a part: a sensor, or an oscillator.")
 @OUTPUT
 def schema(is_of_part: bool, output: str | None) -> None:
-    """Print the JSON Schema of the mission file, for editors.
+    """Print the JSON Schema of mission files, for use in an editor.
 
-    The first line of a file names its schema: # yaml-language-server: $schema=mission.schema.json
+    With --part, it is the schema of the YAML file of a catalogue part. To let an editor find the schema, make this
+    the first line of a mission file: # yaml-language-server: $schema=mission.schema.json
     """
     from bisar_budget.error_kinds.registry import entry_point_faults
     from bisar_budget.mission.model import mission_schema

@@ -1,4 +1,4 @@
-"""Options shared by several commands, and the origins of option values: command line, environment or settings."""
+"""Options shared by several commands, and the origin of each option value: command line, environment or settings."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """Base class of parameter types that allows `ParamType[int]` also with versions of Click before 8.4."""
+        """Base class of parameter types that also allows `ParamType[int]` with versions of Click before 8.4."""
 
         def __class_getitem__(cls, values: object) -> type:  # noqa: D105
             return cls
@@ -39,7 +39,7 @@ _BEARING = ("model", "strict", "exit_zero")  # options that influence the verdic
 
 
 class FileName(click.types.StringParamType):
-    """Parameter type for a file name, which the shell can complete; whether the file exists is not checked."""
+    """Parameter type for a file name that the shell can complete. It is not checked whether the file exists."""
 
     name = "file"
 
@@ -75,9 +75,10 @@ OUTPUT = output_option()
 
 
 def answer_options(command: str, words: str = "", output: str = "", metavar: str = "FILE") -> _Option:
-    """Make the options `--format` and `--output` of a command in the table `ANSWERS`.
+    """Make the options `--format` and `--output` of a command that is listed in `ANSWERS`.
 
-    `words` is added to the help text of `--format`. `output` replaces the help text of `--output`.
+    `words` is appended to the help text of `--format`. `output` replaces the help text of `--output`, and `metavar`
+    is the placeholder of its value.
     """
     from bisar_budget.report.answers import ANSWERS
 
@@ -92,7 +93,7 @@ def answer_options(command: str, words: str = "", output: str = "", metavar: str
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
-    """Parse the values of the option `--set`; raises `click.UsageError` for an invalid value."""
+    """Parse the values of the option `--set`, and raise `click.UsageError` for an invalid value."""
     if not texts:
         return ()
     from bisar_budget.faults import InvalidValueError
@@ -107,8 +108,8 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
 def set_option(effect: str) -> _Option:
     """Make the option `--set`; `effect` is the beginning of its help text.
 
-    Settings and environment variables cannot give its value, because a check in CI has to judge the mission file as
-    it is in the repository.
+    The option cannot be set by settings or environment variables, because a check in CI has to judge the mission file
+    as it is in the repository.
     """
     return click.option(
         "--set",
@@ -127,13 +128,13 @@ GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
-    """Make the option `--model`; `variable` names an environment variable with its default value, if any."""
+    """Make the option `--model`; `variable` names the environment variable that provides its default, if any."""
     words = "Model that decides, instead of that of the mission file."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 
 def date_option(more: str = "") -> _Option:
-    """Make the option `--date`; `more` is added to its help text."""
+    """Make the option `--date`; `more` is appended to its help text."""
     words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
     return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
 
@@ -144,7 +145,7 @@ MODEL, DATE = model_option(), date_option()
 def scheduler_options(doing: str, more: str = "") -> _Option:
     """Make the options `--scheduler` and `--scheduler-timeout`.
 
-    The help text of `--scheduler` begins with `doing`, which says what its workers do, and ends with `more`.
+    The help text of `--scheduler` begins with `doing`, which describes the task of its workers, and ends with `more`.
     """
     named = click.option(
         "--scheduler",
@@ -165,7 +166,10 @@ def scheduler_options(doing: str, more: str = "") -> _Option:
 
 
 def origin_of(parameter: click.Parameter) -> str:
-    """Describe where the value of a parameter comes from: command line, environment, a settings file or default."""
+    """Describe where the value of a parameter comes from.
+
+    The result names the command line, an environment variable, a settings file, or the default.
+    """
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
         return COMMAND_LINE
@@ -178,9 +182,10 @@ def origin_of(parameter: click.Parameter) -> str:
 
 
 def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":
-    """Settings of the project that contains `folder`, by default the current folder; None if it has no settings.
+    """Return the settings of the project that contains `folder`; None if the project has no settings.
 
-    `files` reads the files of the project from disk, or from a Git revision.
+    By default `folder` is the current folder. `files` reads the files of the project from disk, or from a Git
+    revision.
     """
     from bisar_budget.settings import SettingsError, project_settings
 
@@ -193,9 +198,10 @@ def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings |
 
 
 def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
-    """Return the day on which waivers are judged, and the options of the current command that influence verdicts.
+    """Return the day on which waivers are judged, and the options of the running command that influence verdicts.
 
-    `today` is the value of `--date`. If it is None, the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
+    `today` is the value of `--date`. If it is None, the day is given by SOURCE_DATE_EPOCH if this variable is set,
+    otherwise by the current date in UTC.
     """
     from bisar_budget.findings.requirement import Outside, Override
     from bisar_budget.questions.outside import day_of, day_origin
@@ -217,7 +223,10 @@ def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
 
 @contextmanager
 def wrong_usage() -> Iterator[None]:
-    """Context manager that reports a `QuestionError` as wrong usage of the command, without naming a mission."""
+    """Context manager that reports a `QuestionError` as wrong usage of the command.
+
+    The error message does not name a mission.
+    """
     from bisar_budget.mission.quantities import QuestionError
 
     try:

@@ -107,10 +107,11 @@ def passes(
 ) -> None:
     """List the passes of a satellite over the scene, with the verdict of the mission in each.
 
-    The mission names an orbit of a platform and the scene's place on the Earth; its collection.center_time is
-    that of each pass in turn. A pass that cannot be checked is listed with the reason. Exit code: 0 if the mission
-    complies or is waived in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is
-    not known at any time of the period.
+    The mission file must give the orbit of a platform and the location of the scene on the Earth. The mission is
+    checked once for each pass, with collection.center_time set to the mid-time of the pass. A pass that cannot be
+    checked is listed with the reason. Exit code: 0 if the mission complies or is waived in at least one pass; 1 if
+    there is no such pass; 2 for wrong usage, an unusable mission file, or an orbit that is not known at any time of
+    the period.
     """
     if math.isnan(days):
         raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
@@ -157,8 +158,8 @@ def passes(
 def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
     """Write a mission file to `folder` for each pass that complies or is waived.
 
-    Before that, every mission is checked as if its file and the files that it names were in the folder. If a mission
-    cannot be used, or its status differs from the status of its pass, no file is written.
+    Every mission is first checked as if its file and the files that it names were already in the folder. If a mission
+    is unusable, or its status differs from the status of its pass, no file is written.
     """
     texts = {
         os.path.join(folder, _name(each, result.file)): result.mission_text(each, folder) for each in result.accepted
@@ -186,7 +187,7 @@ def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
 
 
 def _name(satellite_pass: "SatellitePass", file: str) -> str:
-    """Name of the mission file for a pass: the name of the original file, followed by the pass's mid-time (UTC)."""
+    """File name for the mission of a pass: the name of the original file, followed by the pass's mid-time in UTC."""
     stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
     stem, suffix = (stem, suffix) if suffix.lower() in MISSION_SUFFIXES else (stem + suffix, MISSION_SUFFIXES[0])
     time = (
@@ -198,9 +199,10 @@ def _name(satellite_pass: "SatellitePass", file: str) -> str:
 
 
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
-    """End the command with an error if a mission is unusable in its folder, or has another status than its pass.
+    """End the command with an error if a mission is unusable in its new folder, or if its status differs there.
 
-    `texts` maps the path of each mission file to its content, in the order of `passes`.
+    The status in the folder must be the same as the status of the pass. `texts` maps the path of each mission file to
+    its content, in the order of `passes`.
     """
     from bisar_budget.faults import MissionError
     from bisar_budget.questions.checks import check

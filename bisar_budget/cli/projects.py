@@ -1,4 +1,4 @@
-"""Groups the missions of a run by their settings; each mission uses the nearest `pyproject.toml`."""
+"""Grouping of the missions of a run by their settings. Each mission uses the nearest `pyproject.toml`."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -29,13 +29,13 @@ class Project:
 
     @contextmanager
     def options(self) -> Iterator[click.Context]:
-        """Context manager within which the current Click context is that of this project."""
+        """Context manager that makes the Click context of this project the current context."""
         with self.context.scope(cleanup=False):
             yield self.context
 
 
 def folder_of_file(file: str) -> str | None:
-    """Absolute path of the folder of a mission file; None if there is no such folder. The file may be missing."""
+    """Absolute path of the folder of a mission file; None if the folder does not exist. The file need not exist."""
     folder = os.path.dirname(file) or os.curdir
     return os.path.abspath(folder) if "\0" not in file and os.path.isdir(folder) else None
 
@@ -43,8 +43,8 @@ def folder_of_file(file: str) -> str | None:
 def by_settings(files: Sequence[str]) -> "list[tuple[Settings | None, tuple[str, ...]]]":
     """Group mission files by the settings nearest to each of them, keeping the order of the files.
 
-    Each group is returned with its settings, which are None if there are none. A mission from standard input uses the
-    settings of the current folder.
+    Each item of the list is a pair of the settings and the files of a group. The settings are None if no settings
+    apply to the files. A mission from standard input uses the settings of the current folder.
     """
     groups: dict[str, tuple[Settings | None, list[str]]] = {}
     for file in files:

@@ -1,4 +1,4 @@
-"""`bisar-budget sensors`: the catalogue of parts (sensors, oscillators) whose error figures a mission can use."""
+"""`bisar-budget sensors`: the catalogue of parts (sensors and oscillators) whose error figures a mission can use."""
 
 import json
 import os
@@ -34,11 +34,13 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
     """List parts of the catalogue, their figures and the sources.
 
     PATTERN is a name, or a glob of names. A mission takes a part's figures by its name: `motion_error: {sensor:
-    stim300}`, `oscillator: {sensor: sit5358}`. Parts of your own are YAML files of the same form: name the file, or
-    folders of files in `[tool.bisar-budget] sensors` of pyproject.toml.
+    stim300}`, `oscillator: {sensor: sit5358}`. You can define your own parts in YAML files of the same form as the
+    files of the catalogue. A mission can give the name of such a file in place of the name of a part. Alternatively,
+    list folders of such files under `sensors` in `[tool.bisar-budget]` of pyproject.toml.
 
-    With --check, FILE is the YAML file of a part, a folder of them, a glob pattern, or - for standard input. Each is
-    read as a mission reads it, and every fault is reported. Exit code: 0 if missions can use all parts, else 2.
+    With --check, FILE is the YAML file of a part, a folder of such files, a glob pattern, or - for standard input.
+    Each file is read as a mission reads it, and every fault is reported. Exit code: 0 if missions can use all parts;
+    otherwise 2.
     """
     if checking:
         if kind is not None:
@@ -56,7 +58,7 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
 
 
 def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
-    """List the parts of the catalogue whose ids match a pattern, and whose kind is `kind` unless that is None.
+    """List the parts of the catalogue whose ids match a pattern, restricted to one kind of part if `kind` is given.
 
     If a pattern matches no part, the command ends with an error.
     """
@@ -89,7 +91,7 @@ def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
 
 
 def _check(names: Sequence[str], format_name: str) -> None:
-    """Report for each part file whether missions can use it; exits with 2 if any file is unusable.
+    """Report, for each part file, whether missions can use it, and exit with code 2 if a file is unusable.
 
     `names` are files, folders of files, glob patterns, or `-` for standard input.
     """
@@ -128,7 +130,7 @@ def _check(names: Sequence[str], format_name: str) -> None:
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
-    """JSON document with the status of each checked part file, and with its faults or its figures."""
+    """Make a JSON document with the status of each checked part file, and with its figures or its faults."""
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.answers.check_content import fault_item
 

@@ -1,4 +1,4 @@
-"""`bisar-budget solve` and `sensitivity`: the effects that the numbers in a mission file have on the verdict.
+"""`bisar-budget solve` and `sensitivity`: the effects of the numbers in a mission file on the verdict.
 
 `solve` finds the values of one number at which the mission begins or ceases to comply. `sensitivity` ranks all
 numbers by their effects on the worst utilization.

@@ -47,14 +47,17 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load mission files, and apply `changes` to them; if any is unusable, write all faults and exit."""
+    """Load mission files and apply `changes` to them; if a mission is unusable, write all faults and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
 
 
 def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
-    """Call the functions `reads`, each of which reads a mission; if any is unusable, write all faults and exit."""
+    """Call functions that each read a mission, and return the missions.
+
+    If a mission is unusable, the faults of all missions are written, and the command exits.
+    """
     found, is_usable = [], True
     for read in reads:
         try:
@@ -87,9 +90,9 @@ def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
     """End the command if an output would replace an input file, or if two outputs would be the same file.
 
-    `files` are the input files, and `targets` the output files. Files to which standard input and standard output are
-    redirected are checked too. The command also ends if an input or output file is in one of `folders`, to which the
-    pictures of a report will be written.
+    `files` are the input files, and `targets` the output files. Files to which standard input or standard output is
+    redirected are checked too. The command also ends if an input or output file is in one of `folders`, the folders
+    for the pictures of reports.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
@@ -113,7 +116,7 @@ def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable
 
 
 def _real_path(path: str) -> str:
-    """Return the absolute path without symbolic links; end the command with an error if that is impossible."""
+    """Return the absolute path without symbolic links; if it cannot be determined, end the command with an error."""
     try:
         return os.path.realpath(path)
     except (OSError, ValueError) as error:  # the working folder was deleted, or the name has a NUL
@@ -129,10 +132,10 @@ def _is_open_as(file: str | int, path: str) -> bool:
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Return the folder that reports use as the base of relative names of files outside any Git repository.
+    """Return the folder relative to which reports name files that are outside any Git repository.
 
-    The folder is the checkout of a GitHub Actions run, or else the current folder. The second value is True if it is
-    the checkout. The path is empty if the current folder was removed.
+    Returns two values: the path of the folder, and whether it is the checkout of a GitHub Actions run. Outside such a
+    run it is the current folder. The path is empty if the current folder was removed.
     """
     try:
         here = os.getcwd()
@@ -148,7 +151,7 @@ def is_terminal() -> bool:
 
 
 def wants_color() -> bool:
-    """Whether standard output is a terminal that shows colours, and the variable NO_COLOR is not set."""
+    """Whether standard output is a terminal that shows colours, and the environment variable NO_COLOR is not set."""
     return (
         sys.stdout is not None
         and sys.stdout.isatty()
@@ -161,9 +164,10 @@ _TABLE_WIDTHS = (80, 100)  # columns of the narrowest and of the widest table
 
 
 def table_width() -> int:
-    """Width of a table on standard output, in characters: that of the terminal, but at least 80 and at most 100.
+    """Width of a table on standard output, in characters.
 
-    The variable COLUMNS replaces the width of the terminal. The default is 80.
+    It is the width of the terminal, but at least 80 and at most 100. The environment variable COLUMNS replaces the
+    width of the terminal. The default is 80.
     """
     least, most = _TABLE_WIDTHS
     return min(max(shutil.get_terminal_size((least, 24)).columns, least), most)
@@ -184,10 +188,10 @@ _LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line
 
 
 def harmless(text: str, format_name: str = "") -> str:
-    """Escape characters in a text that would control a terminal, or a CI runner that reads the log.
+    """Escape characters of a string that would control a terminal, or a CI runner that reads the log.
 
-    In the format `github`, workflow commands are kept; in the format `text`, the colours of a report are kept. In
-    messages, which have no format name, both are escaped.
+    In the format `github`, workflow commands are kept. In the format `text`, the colour codes of a report are kept.
+    In messages, which have no format name, both are escaped.
     """
 
     def escaped(match: re.Match[str]) -> str:
@@ -204,11 +208,11 @@ def harmless(text: str, format_name: str = "") -> str:
 
 
 def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write texts to standard output one after the other.
+    """Write strings to standard output, one after another.
 
-    If the program that reads the output has closed the pipe, the remaining texts are dropped without an error. In the
-    format `text`, characters that the encoding of the terminal lacks are escaped. Other formats are always written in
-    UTF-8.
+    If the program that reads the output has closed the pipe, the remaining strings are dropped without an error. In
+    the format `text`, characters that the encoding of the terminal lacks are escaped. Other formats are always
+    written in UTF-8.
     """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
@@ -229,7 +233,7 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
 
 
 def drop_output() -> None:
-    """Discard the remaining standard output, because Python would report a failed write again at its exit."""
+    """Discard all further standard output, so that Python does not report a failed write once more when it exits."""
     with suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -241,13 +245,13 @@ def complain(message: str) -> None:
 
 
 def fail(message: str) -> NoReturn:
-    """Write an error message to standard error, and exit with 2."""
+    """Write an error message to standard error, and exit with code 2."""
     complain(f"Error: {printable(message)}")
     sys.exit(USAGE_EXIT_CODE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
-    """Write a text to the file `output`, or to standard output if `output` is None or `-`."""
+    """Write a string to the file `output`, or to standard output if `output` is None or `-`."""
     if output is None or output == "-":
         deliver_parts([text], format_name)
     else:
@@ -255,9 +259,10 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
 
 
 def deliver_answer(command: str, answers: "Sequence[object]", format_name: str | None, output: str | None) -> None:
-    """Write the answers of a command, one for each mission, to `output`, or to standard output if it is None or `-`.
+    """Write the answers of a command, one for each mission, to a file or to standard output.
 
-    Without a format name, the format follows from the suffix of `output`; without a suffix it is text.
+    The file is `output`; standard output is used if it is None or `-`. If `format_name` is None, the format follows
+    from the suffix of `output`, and it is `text` if there is no suffix.
     """
     from bisar_budget.extras import MissingExtraError
     from bisar_budget.report import Style
@@ -283,9 +288,10 @@ def deliver_answer(command: str, answers: "Sequence[object]", format_name: str |
 
 
 def _format_of_output(command: str, output: str | None) -> str:
-    """Return the format that the suffix of an output file implies; `text` for no suffix and for standard output.
+    """Return the format that the suffix of an output file implies.
 
-    Raises `click.UsageError` if the command has no format with this suffix.
+    The format is `text` for a name without a suffix and for standard output. Raises `click.UsageError` if the command
+    has no format with this suffix.
     """
     from bisar_budget.report.answers import format_of_file, suffixes
 
@@ -298,7 +304,7 @@ def _format_of_output(command: str, output: str | None) -> str:
 
 
 def write_file(path: str, content: str | bytes) -> None:
-    """Write content to a file; an existing file is replaced only once writing is complete, see `replacing`."""
+    """Write content to a file. An existing file is replaced only once writing is complete, see `replacing`."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as name, open(name, "wb") as file:
         file.write(data)
@@ -306,11 +312,11 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Context manager that yields the name of a temporary file, which replaces the file `path` at the end.
+    """Context manager that yields the path of a temporary file, and finally replaces the file `path` by it.
 
     The temporary file is in a temporary folder beside `path`. If `path` is a symbolic link, its target is replaced
-    and the link remains. After an error or an interrupt the old file remains. Named pipes, sockets and devices are
-    refused, except open streams of this process, which are written to directly. Temporary folders left behind by
+    and the link remains. After an error or an interrupt, the old file remains. Named pipes, sockets and devices are
+    refused, except for open streams of this process, which are written directly. Temporary folders left behind by
     killed commands are removed.
     """
     temporary = lock = None
@@ -351,10 +357,10 @@ def replacing(path: str) -> Iterator[str]:
 
 
 def _own_folder(folder: str) -> tuple[str, int | None]:
-    """Make a temporary folder in `folder`, and lock it, so that no other command removes it.
+    """Make a temporary folder in `folder`, and lock it so that no other command removes it.
 
     Returns the path of the temporary folder and the file descriptor of the lock. The descriptor is None if the system
-    has no locks. The lock is released when the process ends.
+    does not support locks. The lock is released when the process ends.
     """
     import tempfile
 
@@ -371,7 +377,7 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 
 def _remove_abandoned(folder: str) -> None:
-    """Remove the unlocked temporary folders in `folder`, which were left behind by commands that have ended."""
+    """Remove the unlocked temporary folders in `folder`, which commands have left behind."""
     import shutil
 
     prefix, suffix = _TEMPORARY

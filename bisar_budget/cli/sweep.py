@@ -1,4 +1,4 @@
-"""`bisar-budget sweep`: a table with the results of checking a mission for many values of its keys."""
+"""`bisar-budget sweep`: a table with the results of a check for many values of the keys of a mission."""
 
 import os
 import sys
@@ -183,7 +183,10 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Report the expected duration of a long sweep; refuse more than `MAX_UNFORCED_CASES` cases without `--force`."""
+    """Report the expected duration of a long sweep, and refuse a sweep that is too large.
+
+    More than `MAX_UNFORCED_CASES` cases are refused unless `force` is true.
+    """
     from bisar_budget.questions.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
@@ -196,7 +199,7 @@ def _foresee(run: "SweepResult", force: bool) -> None:
 
 
 def _write(run: "SweepResult", output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
-    """Check the cases and write the table part by part; then write the plot, and a summary to standard error."""
+    """Check the cases and write the table block by block, then write the plot, and a summary to standard error."""
     from bisar_budget.report.drawing.figure import drawing_file
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import texts, writer_of

@@ -1,4 +1,7 @@
-"""Finds the missions that are affected by changed files: changed missions, and missions that read a changed file."""
+"""Search for the missions that are affected by changed files.
+
+A mission is affected if its own file, or a file that it reads, has changed.
+"""
 
 import os
 import re
@@ -20,13 +23,13 @@ _SETTINGS_FILE = "pyproject.toml"
 
 
 class _ReadFiles:
-    """Reader of files on disk that records, in `read`, the real path of each file that it has read."""
+    """Reader of files on disk that records the real path of each file that it has read, in `read`."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Return the content of a file; arguments and exceptions are those of `resources.Files.content`."""
+        """Return the content of a file. Arguments and exceptions are the same as for `resources.Files.content`."""
         self.read.add(os.path.realpath(file))
         return DISK.content(file, most, called)
 
@@ -36,12 +39,13 @@ class _ReadFiles:
 
 
 def touched_missions(changed: Sequence[str]) -> list[str]:
-    """Return the sorted paths of the missions that are among the files `changed`, or are affected by them.
+    """Return the sorted paths of the missions that the changed files affect.
 
-    All missions below the current folder are examined. A mission is a YAML file with the sections of a mission, or
-    any YAML file below a folder `missions` that does not describe a part. A changed `pyproject.toml` affects every
-    mission below its folder. A mission that names other files and cannot be used is always listed, because it may
-    name a deleted file, and a list of changed files may not contain deleted files.
+    These are the missions among the files `changed`, and missions that read one of these files. All missions below
+    the current folder are examined. A mission is a YAML file with the sections of a mission, or any YAML file below a
+    folder `missions` that does not describe a part. A changed `pyproject.toml` affects every mission below its
+    folder. An unusable mission that names other files is always listed, because it may name a deleted file, and a
+    list of changed files may not contain deleted files.
     """
     paths = {os.path.realpath(file) for file in changed}
     tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS_FILE]
@@ -55,14 +59,14 @@ def touched_missions(changed: Sequence[str]) -> list[str]:
 
 
 def _missions_below(top: str) -> Iterator[str]:
-    """Yield the mission files in a folder and its subfolders, except in hidden ones."""
+    """Yield the mission files in a folder and its subfolders, except in hidden folders."""
     for folder, folders, names in os.walk(top):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield from (file for name in names if _is_mission(file := os.path.join(folder, name)))
 
 
 def _is_mission(file: str) -> bool:
-    """Whether a YAML file is a mission, judged by its sections or its folder; true if it cannot be read."""
+    """Whether a YAML file is a mission, judged by its sections or its folder; true if the file cannot be read."""
     if not file.endswith(_SUFFIXES):
         return False
     try:
@@ -74,9 +78,10 @@ def _is_mission(file: str) -> bool:
 
 
 def _reads_any(file: str, paths: set[str]) -> bool:
-    """Whether reading the mission `file` also reads one of the files `paths`.
+    """Whether reading the mission `file` involves reading one of the files `paths`.
 
-    Also true for a mission that cannot be used but names other files, because their change may be the cause.
+    The result is also true for an unusable mission that names other files, because a change of these files may be the
+    reason why it is unusable.
     """
     folder, files = folder_of(file), _ReadFiles()
     try:

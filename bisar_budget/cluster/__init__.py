@@ -1,4 +1,7 @@
-"""Sweeps and Monte Carlo draws on other machines: a scheduler with workers, and a folder with finished parts."""
+"""Distribution of sweeps and Monte Carlo draws to other machines, and storage of the finished parts of a sweep.
+
+A Dask scheduler passes the work to its workers. The finished parts of a sweep are stored in a folder.
+"""
 
 # What other rooms may use.
 __all__ = ["parts_folder", "scheduler"]

@@ -1,7 +1,7 @@
-"""Stores the finished parts of a sweep as a Parquet data set with one file for each block of cases.
+"""Storage of the finished parts of a sweep as a Parquet data set, with one file for each block of cases.
 
-A data set belongs to one question, which is the set of all inputs that determine its values. The metadata of each
-file state the question. A file is written under a temporary name and then renamed, so that every stored part is
+A data set belongs to one question, that is the set of all inputs that determine its values. The question is stored in
+the metadata of each file. A file is written under a temporary name and then renamed, so that every stored part is
 complete. Values are stored as the engine computes them, in SI units. At the end of the sweep, the command builds its
 table from the parts.
 """
@@ -24,7 +24,7 @@ _PART_NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
-    """Check that the libraries which an option needs are installed, and that there is memory for them.
+    """Check that the libraries that an option needs are installed, and that there is enough memory for them.
 
     `option` is the name of the option, for messages. `room` is the memory that the libraries need [B]. `extra` is the
     extra of the package `bisar-budget` that installs the libraries. `modules` are the modules to import. Raises
@@ -41,11 +41,11 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
 
 @contextmanager
 def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
-    """Open a folder of parts, and lock it so that no other command uses it.
+    """Open a folder with the finished parts of a sweep, and lock it so that no other command uses it.
 
     If `is_resumed` is true, the command continues from the parts in the folder. Otherwise the folder must have no
     parts. Raises `ClusterError` if there are parts although `is_resumed` is false, if the parts belong to another
-    question, if the folder cannot be written, or if another command uses it.
+    question (the inputs of the sweep), if the folder cannot be written, or if another command uses it.
     """
     with ExitStack() as ends:
         try:
@@ -65,16 +65,20 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
 
 
 class PartsFolder:
-    """The finished parts of one question in a folder; `done` contains the index of the first case of each part."""
+    """Folder with the finished parts of a sweep.
+
+    A part holds the values of a block of cases. `question` identifies the inputs of the sweep, see `question_of`.
+    `done` contains the index of the first case of each finished part.
+    """
 
     def __init__(self, path: str, question: Question) -> None:
         self.path, self.question, self.done = path, question, set[int]()
 
     def find(self, chunks: Chunks, is_resumed: bool) -> None:
-        """Find the finished parts of the question and record them in `done`.
+        """Find the finished parts that belong to the question, and record them in `done`.
 
-        Raises `ClusterError` if there are parts although `is_resumed` is false, or if there are parts of another
-        question and none of this question.
+        The question is the set of inputs of the sweep. Raises `ClusterError` if there are parts although `is_resumed`
+        is false, or if all parts found belong to another question.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -1,8 +1,8 @@
-"""Runs a function on the workers of a Dask scheduler, once for each of many blocks of work.
+"""Execution of a function on the workers of a Dask scheduler, once for each of many blocks of work.
 
-A block is a number of cases of a sweep, a number of draws of a Monte Carlo, or a row to verify. Data that all blocks
-need, such as the mission with its files, are sent to a worker only once. If a worker is lost, Dask gives its blocks
-to other workers. A worker needs only the same version of bisar-budget as the command.
+A block is a number of cases of a sweep, a number of draws of a Monte Carlo simulation, or a row to verify. Data that
+all blocks need, such as the mission with its files, are sent to a worker only once. If a worker is lost, Dask gives
+its blocks to other workers. A worker needs only the same version of bisar-budget as the command.
 """
 
 import asyncio
@@ -47,9 +47,9 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
     """Connect to the workers of a scheduler, and close the connection at the end of the context.
 
     The address `local:N` starts N workers on this machine and ends them later. `patience` is the longest time to wait
-    for a worker [s]. `tell` receives messages for a waiting user. Raises `ClusterError` if the scheduler cannot be
-    reached, has no worker, or has a worker with another version of bisar-budget. Raises `MemoryError` if there is not
-    enough memory for the Dask libraries.
+    for a worker [s]. `tell` is called with messages for a waiting user. Raises `ClusterError` if the scheduler cannot
+    be reached, has no worker, or has a worker with another version of bisar-budget. Raises `MemoryError` if there is
+    not enough memory for the Dask libraries.
     """
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
@@ -84,8 +84,8 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
     """Start a scheduler and `count` workers on this machine, and register their shutdown in `ends`.
 
-    They are started in a separate thread, which Ctrl-C does not interrupt. If the start itself were interrupted, the
-    cluster could not be closed.
+    They are started in a separate thread, which Ctrl-C does not interrupt. A cluster whose start was interrupted
+    could not be closed.
     """
     from distributed import LocalCluster
 
@@ -106,13 +106,16 @@ def _local_cluster(count: int, ends: ExitStack) -> "LocalCluster":
 
 
 def _block_interrupts() -> None:
-    """Block Ctrl-C in this thread and in the workers that it starts, until the workers ignore it themselves."""
+    """Block Ctrl-C in this thread and in the worker processes that it starts.
+
+    The workers later ignore Ctrl-C themselves, see `dask_setup`.
+    """
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
-    """Make a worker of a local cluster ignore Ctrl-C, which a terminal sends to every process.
+    """Make a worker of a local cluster ignore Ctrl-C, because a terminal sends it to every process.
 
     Dask calls this function by its name when a worker starts.
     """
@@ -125,9 +128,9 @@ def _close(opened: "Client | LocalCluster", seconds: float) -> None:
 
 
 def _greet(address: str) -> None:
-    """Check that a Dask scheduler answers at an address; raises `OSError` if another program answers.
+    """Check that a Dask scheduler answers at an address, and raise `OSError` if another program answers.
 
-    A Dask client would take longer to report this problem, and its report would have fewer details.
+    A Dask client would take longer to detect this problem, and its error message would be less specific.
     """
     from distributed.core import rpc
     from distributed.security import Security
@@ -150,7 +153,7 @@ def _greet(address: str) -> None:
 
 @dataclass
 class Workers:
-    """The workers of a scheduler; `threads` is the number of threads that they had at the last count."""
+    """The workers of a scheduler; `threads` is their number of threads at the last count."""
 
     client: "Client"
     address: str
@@ -159,9 +162,9 @@ class Workers:
     threads: int = 0
 
     def look(self) -> None:
-        """Count the threads of the workers, and wait for a worker if there is none.
+        """Count the threads of the workers, and wait for a worker if there are none.
 
-        Raises `ClusterError` if no worker appears in time, or if the scheduler is lost.
+        Raises `ClusterError` if no worker appears in time, or if the connection to the scheduler is lost.
         """
         with suppress(Exception):  # a lost scheduler is reported later, with the blocks
             self.threads = sum(self.client.nthreads().values())
@@ -189,9 +192,9 @@ class Workers:
         """Call `function(common, block)` on workers for each block, and yield the blocks with their results.
 
         The order of the results is arbitrary. `about` returns the name of a block for messages. Only a few blocks per
-        thread are submitted in advance. Raises `ClusterError` if the scheduler or all workers are lost, if every
-        worker that received a certain block was lost, or if a worker cannot compute a block. Raises `RuntimeError` if
-        the function raised an error.
+        thread are submitted in advance. Raises `ClusterError` if the scheduler or all workers are lost, if a block
+        has caused the loss of several workers in turn, or if a worker cannot compute a block. Raises `RuntimeError`
+        if the function raised an error.
         """
         finished: SimpleQueue[Future[Result]] = SimpleQueue()
         # The common data are the result of a task, so that Dask can create them again if their worker is lost.
@@ -254,7 +257,10 @@ def _version_problem(worker: str, worker_version: object, version: str) -> str:
 
 
 def _fault_of_block(error: BaseException, about: str) -> Exception:
-    """Convert the error of a failed block to the exception to raise; `about` names the block in the message."""
+    """Convert the error of a failed block to the exception to raise.
+
+    `about` is the name of the block in the error message.
+    """
     from distributed.scheduler import KilledWorker
 
     if isinstance(error, ClusterError):  # the worker has another version or cannot use the mission

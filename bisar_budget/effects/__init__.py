@@ -1,4 +1,4 @@
-"""Effects of errors on range history and image, by the published model, the full model and exact ranges."""
+"""Effects of errors on range history and image, according to the published model, the full model and exact ranges."""
 
 # Names that other packages may import.
 __all__ = [

@@ -1,14 +1,15 @@
-"""Random atmospheric delays left after correction: the path from each platform to the scene is longer than assumed.
+"""Random atmospheric delays on the paths from the platforms to the scene, as they remain after correction.
 
-A leg is the path between a platform and the scene. Its delay is the zenith delay times a factor. The factor depends
-on the elevation of the platform above the scene. The elevation changes over the aperture, and so does the delay.
-Orders 0 and 1 of the delay displace the image; orders 2 and higher defocus it.
+A leg is the path between a platform and the scene. Its delay is the zenith delay times a factor, which depends on the
+elevation of the platform above the scene. The elevation changes over the aperture, and so does the delay. The
+constant and linear parts of the delay displace the image; parts of higher order defocus it.
 
 The troposphere delays all frequencies by the same amount. Free electrons cause the group delay g = 40.3·TEC/f² [m],
 where TEC is the electron content along the leg [1/m²], and advance the phase at the centre frequency by the same
-amount. In the image, the constant part of the range error is that of the group delay, +ḡ, where ḡ is the mean of g
-over the aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where g₁ is the linear
-part of g. The phases are those of −g together with the phases that the displacement adds. Derived here.
+amount. In the image, the constant part of the range error is therefore +ḡ, the mean of the group delay over the
+aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where g₁ is the linear part of
+g. The phases are those due to −g, plus the phases that the displacement adds. These relations are derived here, not
+taken from a publication.
 
 A delay with a correlation time changes within the aperture as a random process (`range_processes`). The published
 model computes the effects of the process for the line of sight at mid-aperture. In the full model the line of sight
@@ -52,9 +53,9 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
     Parameters
     ----------
     position : Vectors
-        Position of the platform relative to the scene: east, north and up, each (…). [m]
+        Position of the platform relative to the scene: east, north and up, each of shape (…). [m]
     shell : float or (…)
-        Height of the shell. Height 0 gives a flat Earth: 1/sin of the elevation. [m]
+        Height of the shell [m]. For height 0 the ratio is 1/sin(elevation), as on a flat Earth.
     """
     x, y, _ = position
     level = np.square(np.hypot(x, y) / norm(position))  # cos² of the elevation
@@ -92,15 +93,17 @@ def group_delay(mission: Mission, path: PlatformState, delay: str, times: PerCas
 def seen_course(group: Floats, mean: Floats, delay: str) -> Floats:
     """Range error over the aperture that a group delay causes in the image. [m]
 
-    `group` is the group delay over the aperture, and `mean` is its mean. [m] The range error of a tropospheric delay
-    is the group delay itself. Free electrons advance the phase. Their range error has the sign of the group delay
-    only in its constant part, and the opposite sign in all other parts.
+    `group` [m] is the group delay over the aperture, and `mean` [m] is its mean. The range error of a tropospheric
+    delay is the group delay itself. Free electrons advance the phase, so their range error has the sign of the group
+    delay only in its constant part, and the opposite sign in all other parts.
     """
     return group if delay == DELAY else 2 * mean - group
 
 
 def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: PerCase) -> Floats:
-    """Group delay of a leg at the nodes per unit of a constant zenith delay, (nodes, cases). [m/unit]
+    """Group delay of a leg per unit of a constant zenith delay, at the nodes over the aperture. [m/unit]
+
+    The result is (nodes, cases).
 
     Parameters
     ----------
@@ -146,7 +149,7 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
     """Quadratic phase at the edges of the band due to the electron content of both legs. [rad]
 
     If the file states one content for both legs, the phases add. Otherwise the contents are independent, and the
-    mission's rule combines the phases.
+    phases are combined according to the rule `allocation.combine` of the mission.
     """
     legs = list(dispersed_legs(mission, geometry).values())
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
@@ -154,12 +157,12 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> PerCase:
 
 
 def legs_of(owner: str) -> tuple[str, ...]:
-    """Names of the platforms whose legs share a delay of `owner`: one platform, or both for the owner `mission`."""
+    """Names of the platforms on whose legs a delay acts: both if `owner` is `mission`, otherwise `owner` alone."""
     return PLATFORMS if owner == "mission" else (owner,)
 
 
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
-    """Yield the errors due to delays of the air, declared or not; no errors if the file does not describe the air.
+    """Yield the errors due to atmospheric delays, declared or not; yields nothing if the file has no `propagation`.
 
     A delay that the file states for both legs together is one random number. It delays both legs, each by the factor
     for its own elevation. The effects on both legs add with their signs before they are squared. Each leg then also
@@ -182,10 +185,10 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
 
 
 def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Group delay of a leg at the nodes per unit of a zenith delay: with and without the turn of the leg. [m/unit]
+    """Group delay of a leg per unit of a zenith delay, for the turning leg and for the leg at mid-aperture. [m/unit]
 
-    Returns two arrays (nodes, cases). The first follows the elevation of the leg over the aperture. The second has
-    the value at mid-aperture at all nodes.
+    Returns two arrays (nodes, cases), with values at the nodes over the aperture. The first follows the elevation of
+    the leg. The second has the value at mid-aperture at all nodes.
     """
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
@@ -227,7 +230,7 @@ def _delay_error(
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
     """Correlation time of the delay of one leg, or of a delay that both legs share. [s]
 
-    None if the delay is constant, or if the file states no delay.
+    It is None if the delay is constant, or if the file states no delay.
     """
     leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
     return None if leg is None else leg.correlation_time
@@ -236,10 +239,10 @@ def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:
 def _changing(
     seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: PerCase
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects of one unit of a delay that changes within the aperture: in the published and in the full model.
+    """Effects of one unit of a delay that changes within the aperture, according to the published and the full model.
 
-    `group` (nodes, cases) is the group delay along the turning leg, for the full model. `at_mid_aperture` (cases,) is
-    the group delay at mid-aperture, for the published model. [m/unit]
+    `group` (nodes, cases) [m/unit] is the group delay along the turning leg, for the full model. `at_mid_aperture`
+    (cases,) [m/unit] is the group delay at mid-aperture, for the published model.
     """
     k, half = seen.exact.k, seen.exact.half
     along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
@@ -256,7 +259,7 @@ def changing_air(
     """List the errors due to declared constant delays, computed as if the delays had the given correlation time [s].
 
     Only delays without a correlation time of their own are listed. A delay that both legs share is one error in the
-    list. `geometry` is the geometry of the cases.
+    list. `geometry` is the geometry of the cases, and `cases` is their number.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]

@@ -32,7 +32,7 @@ Size = TypeVar("Size")  # effect of an error: a phase or a displacement
 class Correlated(NamedTuple):
     """The six errors of a platform's covariance: the ids of their rows, and their correlations (6, 6).
 
-    The errors are three of position and three of velocity, in this order.
+    They are three position errors and three velocity errors, in this order.
     """
 
     platform: str
@@ -41,11 +41,11 @@ class Correlated(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Id of the combined error that replaces the six errors in a list of phases or displacements."""
+        """Id of the combined error that replaces six correlated errors in a list of phases or displacements."""
         return f"{self.platform}.covariance"
 
     def of(self, cases: Indices) -> "Correlated":
-        """Return the same covariance with the correlations of the cases at the given indices."""
+        """Return the same covariance with the correlations of the cases with the given indices."""
         rows = [
             [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
             for row in self.correlation
@@ -53,7 +53,7 @@ class Correlated(NamedTuple):
         return self._replace(correlation=rows)
 
     def phase(self, phases: Sequence[PerCase] | Floats) -> PerCase:
-        """Combined phase √(gᵀCg) of the six errors. [rad]
+        """Combined phase √(gᵀCg) of the six errors of a platform that have the covariance C. [rad]
 
         `phases` are the phases gᵢσᵢ of the six errors. The result is infinite if any of them is infinite.
         """
@@ -62,9 +62,9 @@ class Correlated(NamedTuple):
         return np.where(np.isnan(size), math.inf, size)[()]
 
     def displacement(self, moves: Sequence[tuple[PerCase, PerCase]]) -> tuple[PerCase, PerCase]:
-        """Rms length of the combined displacement, as the pair (length, 0). [m]
+        """Rms length of the displacement that six correlated errors cause together, as the pair (length, 0). [m]
 
-        `moves` are the displacements of the six errors, east and north. [m] The length is the root of the trace of
+        `moves` [m] are the displacements of the six errors, east and north. The length is the root of the trace of
         the covariance of the combined displacement. The combined displacement has no direction.
         """
         length = np.sqrt(sum(squared(self.correlation, along) for along in zip(*moves, strict=True)))
@@ -104,7 +104,7 @@ def squared(correlation: Sequence[Sequence[PerCase]], parts: Sequence[PerCase] |
 def phase_parts(phases: Phases, rule: str, groups: Sequence[Correlated]) -> list[tuple[str, PerCase]]:
     """List the phases that a rule combines, as pairs of id and phase. [rad]
 
-    `phases` are the same pairs for the single errors. Under `rss` the six errors of a covariance become a single
+    `phases` are pairs of this form for the single errors. Under `rss` the six errors of a covariance become a single
     entry. Under all other rules they remain six entries.
     """
     return _parts(phases, rule, groups, Correlated.phase)
@@ -176,7 +176,7 @@ def combined(sizes: Sequence[PerCase] | Floats, rule: str) -> PerCase:
 
 
 def largest_signed_sum(vectors: Floats) -> PerCase:
-    """Largest length of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
+    """Length of the longest of all sums ±v₁ ± v₂ … of plane vectors (n, 2, ...), computed exactly.
 
     All sums lie in a polygon that has two sides parallel to each vector. The longest sum is a corner of this polygon.
     To find the corners, every vector in the lower half plane is reversed, and the vectors are sorted by angle.
@@ -195,7 +195,7 @@ def largest_signed_sum(vectors: Floats) -> PerCase:
 
 # ---------------------------------------------------------------------- notes
 def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ...]:
-    """Notes, one for each covariance, on how a combination under a rule treats the correlations."""
+    """Notes, one for each covariance, on how a combination rule treats its correlations."""
     if rule == "rss":
         return tuple(phrases.note("counted-as-one", group=group.id) for group in groups)
     return tuple(phrases.note("correlations-unused", group=group.id) for group in groups)

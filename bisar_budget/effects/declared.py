@@ -1,9 +1,9 @@
 """Effects of the declared errors according to both models, and the allowable sizes of the errors, for many cases.
 
-A case is one collection; a check of a mission has a single case. The published model, Tables I and II and (25) of
-Rigling & Moses, is linear. The full model holds for errors of any size. Its effects are taken as proportional to the
-error where the second order provably does not matter. Elsewhere they are computed from exact ranges. An error may
-have either sign, and a bound on its size covers both signs. Phases and allowables are therefore those of the worse
+A case is one collection; a check of a mission has a single case. The published model, Tables I and II and equation
+(25) of Rigling & Moses, is linear. The full model holds for errors of any size. Its effects are taken as proportional
+to the error if the second order provably does not matter, and are otherwise computed from exact ranges. An error may
+have either sign, and a bound on its size covers both signs. Phases and allowables are therefore given for the worse
 sign.
 
 Errors are stored in blocks, whose arrays are (errors, cases). With a single case, all errors form one block. With
@@ -58,19 +58,19 @@ _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
 class Declared(NamedTuple):
-    """Phases and displacements that errors of given sizes cause, in arrays over cases or plain numbers of one case.
+    """Phases and displacements that errors of given sizes cause, as arrays over cases or as numbers for one case.
 
-    `qpe` and `cubic` are the quadratic and cubic phase at the aperture edge for the worse sign of the error. [rad]
-    They have the sign of the first-order phase of the declared error. `rest` is the rms phase beyond the cubic order
-    for the worse sign. [rad]
+    `qpe` and `cubic` [rad] are the quadratic and cubic phase at the aperture edge for the worse sign of the error.
+    They have the sign of the first-order phase of the declared error. `rest` [rad] is the rms phase beyond the cubic
+    order for the worse sign.
 
-    `displacement` is the displacement east and north for the declared sign of the error. `opposite` is the
-    displacement for the opposite sign. [m] Both are NaN (None in one case) for a pure phase error, and in the
-    published model if Q has no inverse. A displacement is also NaN if no ground point has the range history that the
-    error of that sign causes. The phases are then infinite.
+    `displacement` [m] is the displacement east and north for the declared sign of the error. `opposite` [m] is the
+    displacement for the opposite sign. For a pure phase error, and in the published model if Q has no inverse, both
+    are NaN; in plain numbers they are None. A displacement is also NaN if no ground point has the range history that
+    the error with this sign causes. The phases are then infinite.
 
-    `hidden` is the hidden phase, which autofocus does not correct. [rad] Part of the range error cannot be removed by
-    any displacement, because the bandwidth and the turn of the line of sight do not resolve it. The hidden phase is
+    `hidden` [rad] is the hidden phase, which autofocus does not correct. A part of the range error remains for any
+    displacement of the image, because of the finite bandwidth and the turn of the line of sight. The hidden phase is
     the quadratic phase that lowers the peak as much as this part does.
     """
 
@@ -82,7 +82,7 @@ class Declared(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Magnitude of the phase that is compared with a limit raised by the gain of autofocus. [rad]
+        """Phase to compare with a limit that has been raised by the gain of autofocus. [rad]
 
         Autofocus corrects the quadratic phase φ₂, but not the hidden phase φₕ. The limit is raised for both by the
         factor `gain`, so the hidden phase is multiplied by the same factor. The result is √(φ₂² + (gain·φₕ)²).
@@ -140,8 +140,8 @@ class Allowed(NamedTuple):
     `smallest` is the allowable for all requirements. `quadratic` is the allowable for the limit of the quadratic
     phase alone. It equals `smallest` unless it was searched for separately (see `ErrorBlock.allowed`).
 
-    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. If the image
-    ends at that size, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 where no size reaches a limit.
+    `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. If larger errors
+    leave no image, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 where no size reaches a limit.
     """
 
     smallest: Floats
@@ -152,7 +152,7 @@ class Allowed(NamedTuple):
 class ImagePlane(NamedTuple):
     """Inverse of the matrix Q for each case, as adjugate and determinant.
 
-    Q⁻¹ maps the constant [m] and the linear part [m/s] of a range error to the displacement of the image. [m]
+    Q⁻¹ maps the constant [m] and the linear part [m/s] of a range error to the displacement of the image [m].
     `is_singular` marks the cases in which Q has no usable inverse.
     """
 
@@ -161,10 +161,10 @@ class ImagePlane(NamedTuple):
     is_singular: PerCaseFlag = False
 
     def displacement(self, effect: Effect, size: PerCase) -> tuple[PerCase, PerCase]:
-        """Displacement of the image on the ground, east and north, according to (25). [m]
+        """Displacement of the image on the ground, east and north, by equation (25) of Rigling & Moses. [m]
 
-        `effect` is the effect of one unit of an error, and `size` is the size of the error in this unit. NaN where Q
-        has no usable inverse.
+        `effect` is the effect of one unit of an error, and `size` is the size of the error in this unit. The result
+        is NaN where Q has no usable inverse.
         """
         (a, b), (c, d) = self.adjugate
         scale = size / np.where(self.is_singular, math.nan, self.determinant)
@@ -180,12 +180,12 @@ _published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = eval
 
 
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
-    """Invert the published matrix Q, (19) and (30).
+    """Invert the matrix Q of the published model, given by equations (19) and (30).
 
     Returns the inverse, and the angle between the range and the Doppler gradient of Q. [deg]
 
     The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. Q
-    can therefore be singular where the true gradients are not parallel. The only look vectors in Q are those at
+    can therefore be singular where the true gradients are not parallel. Q contains only the look vectors at
     mid-aperture. Where they almost cancel on the ground, Q has no usable inverse either.
     """
     ground: list[PerCase] = []
@@ -204,7 +204,7 @@ class OwnPlane(NamedTuple):
     is_singular: PerCaseFlag = False
 
     def displacement(self, effect: FullEffect, size: PerCase) -> tuple[PerCase, PerCase]:
-        """Displacement of the image on the ground, east and north, by an error of the given size. [m]
+        """Displacement of the image on the ground, east and north, due to an error of the given size. [m]
 
         `effect` is the effect of one unit of the error.
         """
@@ -217,11 +217,11 @@ class ErrorBlock:
     Attributes
     ----------
     sources : sequence of ErrorSource
-        The errors.
+        Errors of the block, in the order of the first axis of the arrays.
     declared : (errors, cases)
-        Signed sizes, coverage factor included; NaN where the file declares no size.
+        Declared sizes with their signs, including the coverage factor; NaN where the file declares no size.
     effects : mapping of str to Effect
-        Effect of one unit for each model. In the full model it is the first-order effect.
+        Effects of one unit of each error, by the name of the model. In the full model they are first-order effects.
     """
 
     def __init__(self, table: "DeclaredErrors", sources: Sequence[ErrorSource]) -> None:
@@ -248,8 +248,8 @@ class ErrorBlock:
     def per_unit(self, model: str) -> Floats:
         """Magnitudes of the first-order effects per unit of each error, (3, errors, cases).
 
-        The effects are the judged phase [rad], the cubic phase [rad] and the displacement [m]. An unknown
-        displacement counts as 0.
+        The effects are the phase [rad] that is compared with the limit (see `Declared.judged`), the cubic phase [rad]
+        and the displacement [m]. An unknown displacement counts as 0.
         """
         if model not in self._per_unit:
             effect = self.effects[model]
@@ -264,7 +264,8 @@ class ErrorBlock:
     def hidden_per_unit(self) -> Floats:
         """First-order hidden phase and rms phase beyond the cubic order per unit of each error. [rad/unit]
 
-        The array is (2, errors, cases). Both phases are 0 for errors that do not displace the image.
+        The array is (2, errors, cases). Both phases are 0 for errors that do not displace the image. Autofocus does
+        not correct the hidden phase, which `Declared` defines.
         """
         phases = np.zeros((2, *self.declared.shape))
         if self.moves:
@@ -273,9 +274,10 @@ class ErrorBlock:
         return phases
 
     def left_per_unit(self, indices: Sequence[int]) -> Floats:
-        """Range error that remains at the nodes if the image is at its first-order position. [m/unit]
+        """Range error that remains over the aperture if the image is at its first-order position. [m/unit]
 
-        The result is (errors, nodes, cases). `indices` are the indices of the errors in the block.
+        The result has the values at the nodes, (errors, nodes, cases). `indices` are the indices of the errors in the
+        block.
         """
         full = self.effects["full"]
         if self.cases == 1:
@@ -289,7 +291,8 @@ class ErrorBlock:
     def adds(self, size: Floats) -> Floats:
         """Upper bounds of the second-order effects of errors with the given sizes, (3, errors, cases).
 
-        The effects are the judged phase [rad], the cubic phase [rad] and the displacement [m].
+        The effects are the phase [rad] that is compared with the limit (see `Declared.judged`), the cubic phase [rad]
+        and the displacement [m].
         """
         strays = self._strays(size)
         return self.table.per_metre * self._grows(size, strays) + self.table.per_stray * strays
@@ -297,10 +300,10 @@ class ErrorBlock:
     def _strays(self, size: Floats) -> Floats:
         """Upper bound of the distance between the image point and its first-order position, (errors, cases). [m]
 
-        An error that moves a platform by r̃ within the aperture changes the direction to the ground by r̃/R. If this
-        change varies over the aperture in the same way as the remaining range error ρ, the minimum of the phase
-        variance V is displaced from the first-order image point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges`
-        defines V, H and ⟨ ⟩.
+        `size` are the sizes of the errors. An error that moves a platform by r̃ within the aperture changes the
+        direction to the ground by r̃/R, where R is the range. If this change varies over the aperture in the same way
+        as the remaining range error ρ, the minimum of the phase variance V is displaced from the first-order image
+        point. The distance is at most H⁻¹⟨r̃/R, ρ⟩. `exact_ranges` defines V, H and ⟨ ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, beyond_cubic = self.hidden_per_unit
@@ -327,16 +330,16 @@ class ErrorBlock:
     def _grows(self, size: Floats, strays: Floats) -> Floats:
         """Upper bound of the second-order part of the range error, (errors, cases). [m]
 
-        `strays` is the upper bound from `_strays`. [m]
+        `strays` [m] is the upper bound from `_strays`.
 
         Let r̃ be the motion of a platform, x̂ the displacement of the image, and P⊥ the projection across the line of
         sight. The second-order term of the range error, summed over both platforms, is −Σ|P⊥(r̃ − x̂)|²/2R. Its
-        magnitude is at most |r̃ − x̂|²/R, with the range R of the nearer platform.
+        magnitude is at most |r̃ − x̂|²/R, where R is the range of the nearer platform.
 
         With a direct path, the second-order term of the ranges is bounded separately for each platform, because for a
         distant platform much of it cancels to first order. The second-order term of the distance D between the
-        platforms, |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore at most that of the larger
-        term.
+        platforms, |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore at most the magnitude of
+        the larger term.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -424,7 +427,7 @@ class ErrorBlock:
         `sizes` (n,) are the magnitudes of the errors.
 
         Returns an array (2, rows, n). The first axis is the sign of the errors, positive first. The rows are those of
-        `point_paths.ROWS`. Values are NaN where no ground point has the range history.
+        `point_paths.ROWS`. Values are NaN where no ground point has the range history that the error causes.
         """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -433,10 +436,10 @@ class ErrorBlock:
 
     @cached_property
     def _lane(self) -> Indices:
-        """Index of the lane of each error with positive sign in each case, (errors, cases).
+        """Index of the lane of each error with positive sign, (errors, cases).
 
-        A lane is one error with one sign in one case. The lanes of an error's negative sign follow those of its
-        positive sign.
+        A lane is one error with one sign in one case. The lanes of an error with negative sign directly follow its
+        lanes with positive sign.
         """
         first_lane = np.zeros((len(self.sources), 1), dtype=int)
         first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
@@ -450,7 +453,7 @@ class ErrorBlock:
     def paths(self) -> PointPaths:
         """Paths of the image point as errors grow, for the errors of the block that displace it.
 
-        For each error, the paths for the positive sign come before those for the negative sign.
+        For each error, the paths for the positive sign come first, followed by the paths for the negative sign.
         """
         if self._follows is None:
             table, full = self.table, self.effects["full"]
@@ -469,7 +472,8 @@ class ErrorBlock:
     def quadratic_by_sign(self) -> Floats:
         """Exact quadratic phases of the declared errors for each sign, positive first, (2, errors, cases). [rad]
 
-        NaN for errors whose first-order effect is accurate enough, and for a sign of an error that leaves no image.
+        Values are NaN for errors whose first-order effect is accurate enough, and where the error with this sign
+        leaves no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
@@ -512,8 +516,8 @@ class ErrorBlock:
         limits : three of (errors, cases) or (cases,) or None
             Limits of quadratic phase [rad], cubic phase [rad] and displacement [m]; None means no limit.
         is_complete : bool
-            Also search for the allowable that follows from the limit of the quadratic phase alone. If false,
-            `quadratic` of the result equals `smallest`.
+            Whether to search separately for the allowable that follows from the limit of the quadratic phase alone.
+            If false, `quadratic` of the result equals `smallest`.
         """
         limit = np.array([self._limit(requirement, sizes) for requirement, sizes in enumerate(limits)])
         per_unit = self.per_unit(model)
@@ -547,7 +551,7 @@ class ErrorBlock:
         return ends_there
 
     def _limit(self, requirement: int, limit: PerCase | None) -> Floats:
-        """Limit of a requirement, given by its index, for each error, (errors, cases); NaN where there is no limit.
+        """Limit of the requirement with the given index for each error, (errors, cases); NaN where there is no limit.
 
         For a pure phase error only the quadratic phase has a limit.
         """
@@ -601,7 +605,7 @@ class ErrorBlock:
 
 
 def _less(shift: Vectors, velocity: Vectors, tag_s: Floats) -> Vectors:
-    """Shift of a platform by a time tag error, minus its first-order part `tag_s`·velocity. [m]"""
+    """Displacement of a platform that a time tag error causes, minus its first-order part `tag_s`·velocity. [m]"""
     (x, y, z), (u, v, w) = shift, velocity
     return (x - tag_s * u, y - tag_s * v, z - tag_s * w)
 
@@ -622,11 +626,12 @@ class DeclaredErrors:
     exact : ExactRanges
         Exact ranges of the cases.
     shown : container of str, optional
-        Ids of the rows to list in addition to the declared errors; omitted: every row is listed.
+        Ids of the rows to list in addition to the declared errors. By default every row is listed.
     gain : float or (cases,)
-        Factor by which autofocus raises the limit of quadratic phases. It does not apply to hidden phases.
+        Factor by which autofocus raises the limit of quadratic phases. It does not apply to hidden phases, which
+        autofocus does not correct.
     is_complete : bool
-        Whether to compute all numbers of each row, in the same way for any number of cases.
+        Whether to compute all numbers of each row, with the same algorithm for any number of cases.
 
     Attributes
     ----------
@@ -703,9 +708,10 @@ class DeclaredErrors:
     def edge_of(self, error: ErrorSource) -> PerCase:
         """Largest position error of a platform within the aperture per unit of an error. [m/unit]
 
-        Errors of position, velocity and acceleration are evaluated at the aperture edge. For a time tag error, or a
-        motion that is given at the nodes, it is the largest value at the nodes. If the error moves both platforms, it
-        is the larger value of the two. It is 0 for an error that moves no platform.
+        Errors of position, velocity and acceleration are evaluated at the aperture edge. A time tag error, or a
+        motion that is given at the nodes over the aperture, is evaluated at all nodes, and the largest value is
+        taken. If the error moves both platforms, the result is the larger value of the two. It is 0 for an error that
+        moves no platform.
         """
         if not error.is_time_tag and error.shifts is None:
             return 0.0 if error.kind.order is None else self.edge[error.kind.order]
@@ -713,10 +719,11 @@ class DeclaredErrors:
         return farthest
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
-        """Maximum deviation of the shift by a time tag error from its first-order part, (cases,). [m]
+        """Largest higher-order part of the position error due to a time tag error, (cases,). [m]
 
-        The maximum is taken over the aperture and over both signs of the error. The first-order part is the size of
-        the error times the velocity. For an error of both platforms, the maxima of both are added.
+        The higher-order part is the position error minus its first-order part, which is `size`, the size of the
+        error, times the velocity. Its largest length over the aperture and over both signs of the error is taken. If
+        the error belongs to both platforms, the largest lengths of both are added.
         """
         times, bend = self.exact.times, np.zeros(self.cases)
         for platform in error.platforms:
@@ -728,20 +735,20 @@ class DeclaredErrors:
         return bend
 
     def _order(self, error: ErrorSource) -> int:
-        """Exponent of slow time to which the position error due to an error is proportional.
+        """Exponent of slow time in the position error due to an error, such as 1 for a velocity error.
 
         It is -1 for an error that moves no platform. It is 0 for a time tag error and for a motion that is given at
-        the nodes, because their directions contain the change over the aperture.
+        the nodes over the aperture, because their directions already contain the variation over the aperture.
         """
         if not error.platforms:
             return -1
         return error.kind.order or 0 if error.shifts is None else 0
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
-        """Position error at the nodes per unit of an error, along its direction, (nodes, cases). [m/unit]
+        """Position error per unit of an error along the error's direction, at the nodes of the aperture. [m/unit]
 
-        For a time tag error, or a motion that is given at the nodes, the result is 1, because the direction contains
-        the motion. For an error that moves no platform the result is the range error.
+        The result is (nodes, cases). For a time tag error, or a motion that is given at the nodes, it is 1, because
+        the direction contains the motion. For an error that moves no platform the result is the range error.
         """
         exact = self.exact
         if order >= 0:
@@ -772,7 +779,7 @@ class DeclaredErrors:
         return self._does[key]
 
     def farthest(self, model: str, error: ErrorSource) -> tuple[Floats, Floats]:
-        """Displacement by a declared error, east and north, for the sign that moves the image farther. [m]
+        """Displacement of the image by a declared error, east and north, for the sign that moves it farther. [m]
 
         Each component is (cases,). See `Declared.farthest`. The displacement is computed for all errors of a block at
         once.
@@ -792,23 +799,24 @@ class DeclaredErrors:
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Exact quadratic phases of a declared error for each sign, positive first, (2, cases). [rad]
 
-        NaN where the first-order effect is accurate enough, or where the error with this sign leaves no image.
+        Values are NaN where the first-order effect is accurate enough, or where the error with this sign leaves no
+        image.
         """
         block, index = self.block_of(error)
         return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
-        """Mark the cases in which a model other than the gating model makes a result doubtful.
+        """Mark the cases in which the model that does not decide the verdict makes a result doubtful.
 
-        `is_over` marks the cases in which a limit is exceeded in that model. With a direct path the published model
-        makes no result doubtful, because it does not include the direct path.
+        `model` is the name of this model, and `is_over` marks the cases in which it exceeds a limit. With a direct
+        path the published model makes no result doubtful, because it does not include the direct path.
         """
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Note explaining why a model gives no displacement of the image in a case.
+        """Note that explains why a model gives no displacement of the image in a case.
 
-        Empty if the model gives a displacement.
+        The note is empty if the model gives a displacement.
         """
         if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
@@ -822,8 +830,8 @@ def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
     """Platforms that each error moves, and the directions of the motion, in the form that `Lanes` uses.
 
     Returns two arrays. The first is (2, errors, 1), with 1 for a platform that the error moves and 0 for any other.
-    The second has the directions, (2, 3, nodes, errors, cases). Its axes of nodes and cases have length 1 if no
-    direction depends on them.
+    The second has the directions, (2, 3, nodes, errors, cases). If no direction varies over the nodes or over the
+    cases, the corresponding axis has length 1.
     """
     ways = [
         (platform, index, error.way_of(platform))
@@ -842,7 +850,7 @@ def _motions(errors: Sequence[ErrorSource]) -> tuple[Floats, Floats]:
 
 
 class Model:
-    """The published or the full model for a single case, which evaluates one error at a time.
+    """The published or the full model, evaluated for one error at a time in a single case.
 
     Its methods take and return plain numbers. A missing value is None.
     """
@@ -861,7 +869,8 @@ class Model:
         """Displacement of the image on the ground, east and north, from the first-order effect of an error. [m]
 
         `effect` is the effect of one unit, and `size` is the size of the error in this unit. In the published model
-        the displacement follows from (25). It is None if the published Q has no usable inverse.
+        the displacement follows from equation (25) of Rigling & Moses. It is None if the matrix Q of this model has
+        no usable inverse.
         """
         return point(self.plane.displacement(effect, size))
 
@@ -870,7 +879,7 @@ class Model:
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Note explaining why no size of an error reaches a limit of the quadratic phase."""
+        """Note that explains why no size of an error reaches a limit of the quadratic phase."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
@@ -902,7 +911,7 @@ class Model:
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
         """Smallest size, of either sign, at which an error reaches the limit of a requirement.
 
-        None if no size reaches the limit.
+        The result is None if no size reaches the limit.
         """
         return self.allowed(source, [limit if name == requirement else None for name in LIMITING_REQUIREMENTS])[0]
 
@@ -916,22 +925,25 @@ class Model:
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
-        """First-order hidden phase per unit of an error; 0 in the published model. [rad/unit]"""
+        """First-order hidden phase per unit of an error; 0 in the published model. [rad/unit]
+
+        Autofocus does not correct the hidden phase, which `Declared` defines.
+        """
         block, index = self.errors.block_of(source)
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
         """Whether an error that is larger than the given allowable size leaves no image.
 
-        `size` must be the result of an earlier search. Always false in the published model.
+        `size` must be the result of an earlier search. The result is always false in the published model.
         """
         block, index = self.errors.block_of(source)
         return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
-        """Whether the effects of an error are proportional to its size up to the size that reaches a limit.
+        """Whether the effects of an error are proportional to its size up to the size at which it reaches a limit.
 
-        Always true in the published model.
+        The result is always true in the published model.
         """
         block, index = self.errors.block_of(source)
         requirement_index = LIMITING_REQUIREMENTS.index(requirement)
@@ -943,12 +955,12 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether the effects of an error of a given size are proportional to it, by the second-order bounds."""
+        """Whether second-order bounds show that the effects of an error of a given size are proportional to it."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement due to an error of a signed size, from exact ranges; None if no image forms."""
+        """Phases and displacement due to an error of signed size `size`, by exact ranges; None if no image forms."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True
@@ -957,22 +969,23 @@ class Model:
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
-        """Largest magnitude, over the nodes, of the first-order range error at the scene centre. [m/unit]"""
+        """Largest magnitude over the aperture of the first-order range error at the scene centre. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
     def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
-        """Range error that remains at a ground point with an error of a given size, at the nodes, (nodes,). [m]
+        """Range error over the aperture that remains if an error of the given size moves the image to a ground point.
 
-        `point` is the ground point, east and north of the scene centre. [m]
+        `point` [m] is this ground point, east and north of the scene centre. Returns the range error [m] at each
+        node, (nodes,).
         """
         remaining = self.exact.left_over(self.errors.lanes(source), np.array([size]), point)
         range_error: list[float] = remaining[:, 0].tolist()
         return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
-        """First-order range error that remains at the image point of an error, at the nodes, (nodes,). [m]
+        """First-order range error over the aperture that remains at the point to which an error moves the image. [m]
 
-        `size` is the size of the error in its unit.
+        `size` is the size of the error in its unit. Returns the range error at each node, (nodes,).
         """
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes

@@ -1,4 +1,4 @@
-"""Owner, kind and axis of an error (`Subject`), and the effect of one unit of it in the published and full model.
+"""Owner, kind and axis of an error (`Subject`), and the effect of one unit of the error in both models.
 
 The published effects follow Rigling & Moses (Tables I and II). The full model includes the turn of the line of sight
 and the phase that the displacement of the image adds (`ranges.exact_ranges`).
@@ -39,14 +39,15 @@ class Subject(NamedTuple):
     """Subject of a row or an error: owner, kind and axis.
 
     The function `subject` creates a subject together with its id. Code reads the fields and never parses an id.
-    `owner` is the part of the system whose share of the budget the error uses: transmitter, receiver or clock. It is
-    mission if the error belongs to no part of the system. `kind` is the name of a kind in `error_kinds`: a kind of
-    error, such as position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain or other, or a
-    kind of sum, such as dispersion or specification.
+    `owner` is the part of the system whose share of the budget the error uses: `transmitter`, `receiver` or `clock`.
+    It is `mission` if the error belongs to no part of the system. `kind` is the name of a kind in `error_kinds`: a
+    kind of error, such as position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain or
+    other, or a kind of sum, such as dispersion or specification.
 
-    The meaning of `axis` depends on the kind. It is the axis of `frame`, the term of the clock, the name of a
-    declared value of a sensor or of the air, the name of an error determined elsewhere, the specified key, or the
-    type of a vibration. `entry` is the index of the error in a list of the file.
+    The meaning of `axis` depends on the kind. It is an axis of `frame` for a motion error, the term of the clock for
+    a timing error, the name of the declared value for an error of a sensor or of the atmosphere, the type for a
+    vibration, the name in the file for an error of the kind `other`, and the key of the error for a specification.
+    `entry` is the index of the error if the file states it in a list.
     """
 
     id: str
@@ -58,12 +59,12 @@ class Subject(NamedTuple):
 
     @property
     def facts(self) -> ErrorKind:
-        """Object of the kind, with the properties that commands need."""
+        """The `ErrorKind` of the subject, with the properties that commands need."""
         return kind_of(self.kind)
 
     @property
     def source_kind(self) -> SourceKind:
-        """Object of the kind, if the subject belongs to an error and not to a sum."""
+        """The `SourceKind` of the subject, which must belong to an error and not to a sum."""
         facts = self.facts
         assert isinstance(facts, SourceKind), "the subject is that of a sum"
         return facts
@@ -81,7 +82,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """One note for each value of a part, for example of a sensor, that a key of the mission file overrides.
+    """Notes on the values of a part, such as a sensor, that the mission file overrides; one note for each value.
 
     `figures` are the keys of the values to include. By default, all values in `overridden` are included.
     """
@@ -105,7 +106,7 @@ def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
 def _plain_way(component: PerCase) -> PerCase:
     """Convert a component of a direction in a single case to a float.
 
-    A component that varies over the nodes of the aperture, (nodes, cases), stays an array.
+    A component that varies over the aperture, (nodes, cases), stays an array.
     """
     return component if np.ndim(component) > 1 else plain(component)
 
@@ -179,13 +180,13 @@ class ErrorSource(NamedTuple):
         )
 
     def direction_of(self, platform_index: int) -> Vectors:
-        """Direction in which the error moves a platform, given by its index; the velocity for a time tag error."""
+        """Direction in which the error moves the platform with the given index; its velocity for a time tag error."""
         return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
 
     def way_of(self, platform_index: int) -> Any:
-        """Motion of a platform at the nodes per unit of the error, from `shifts`.
+        """Motion of the platform with the given index per unit of the error, at the nodes of the aperture.
 
-        If `shifts` is not set, the result is the direction of the error.
+        The motion comes from `shifts`. If `shifts` is not set, the result is the direction of the error.
         """
         return self.direction_of(platform_index) if self.shifts is None else self.shifts[platform_index]
 
@@ -213,7 +214,7 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_time_tag(self) -> bool:
-        """Whether the error shifts a path in time.
+        """Whether the error is a time tag error, which shifts the path of a platform in time.
 
         On a turning path the effect of such an error is not proportional to its size.
         """
@@ -226,22 +227,22 @@ class ErrorSource(NamedTuple):
 
     @property
     def kind(self) -> SourceKind:
-        """Object of the error's kind, with the properties that commands need."""
+        """The `SourceKind` of the error, with the properties that commands need."""
         return self.subject.source_kind
 
     @property
     def is_covered(self) -> bool:
         """Whether the declared size includes the coverage factor.
 
-        False for terrain and for a pure phase error.
+        The result is false for terrain and for a pure phase error.
         """
         return self.kind.is_covered
 
     @property
     def is_heard(self) -> bool:
-        """Whether the data contain the error.
+        """Whether the error appears in the radar data.
 
-        False for a clock error that the synchronization removes completely.
+        The result is false for a clock error that the synchronization removes completely.
         """
         return self.clock is None or any(map(np.any, self.clock))
 
@@ -257,10 +258,10 @@ class ErrorSource(NamedTuple):
 
     @property
     def platforms(self) -> tuple[int, ...]:
-        """Indices of the platforms whose positions have the error: 0 for the transmitter, 1 for the receiver.
+        """Indices of the platforms whose positions the error affects: 0 for the transmitter, 1 for the receiver.
 
-        An error of the mission is in the positions of both platforms. The result is empty for an error that moves no
-        platform.
+        An error that is declared for the mission as a whole, and not for a single platform, affects the positions of
+        both platforms. The result is empty for an error that moves no platform.
         """
         return _PLATFORMS_OF.get(self.owner, (0, 1)) if self.is_position else ()
 
@@ -277,8 +278,8 @@ PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they t
 class LinePiece(NamedTuple):
     """Piece of a range error over the aperture, approximated by a straight line.
 
-    `time` is the centre τ_i of the piece, counted from mid-aperture. [s] `value` (27) [m] and `slope` (28) [m/s] are
-    the range error of the line and its rate at this time.
+    `time` [s] is the centre τ_i of the piece, counted from mid-aperture. According to equations (27) and (28),
+    `value` [m] is the range error of the line at this time, and `slope` [m/s] is its rate.
     """
 
     time: float
@@ -287,14 +288,14 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name of the range and Doppler gradients that a model uses for Q_i: as printed in the paper, or true values."""
+    """Name of the range and Doppler gradients in a model's matrix Q_i: as printed in the paper, or true gradients."""
     return PRINTED if model == "published" else TRUE
 
 
 def indicated_point(
     geometry: BistaticGeometry, piece: LinePiece, model: str, seen_from: GroundVector = (0.0, 0.0)
 ) -> GroundVector:
-    """Ground point that a piece of range error indicates, (29), relative to the scatterer. [m]
+    """Ground point, relative to the scatterer, that a piece of range error indicates; from equation (29). [m]
 
     Parameters
     ----------
@@ -303,15 +304,16 @@ def indicated_point(
     piece : LinePiece
         Piece of the range error, without the range history of the scatterer itself.
     model : str
-        `published`: Q_i of (30) as printed, with the platforms at their positions at τ_i and the slant ranges of
-        mid-aperture. Any other name: the true gradients of the lines of sight at τ_i.
+        For `published`, Q_i is taken from equation (30) as printed, with the platforms at their positions at τ_i and
+        the slant ranges at mid-aperture. For any other name, the true gradients of the lines of sight at τ_i are
+        used.
     seen_from : (2,)
         Position of the scatterer, east and north. [m]
 
     Returns
     -------
     (2,)
-        East and north of the indicated point.
+        Position of the indicated point, east and north. [m]
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Random navigation errors: errors of inertial sensors, lever arms, and noise of a position.
+"""Random navigation errors: errors of inertial sensors, errors of lever arms, and position noise.
 
 A bias of an inertial sensor is a constant error over the aperture. Noise is an independent error at every moment. The
 motion errors that both cause are zero at mid-aperture, because the mission separately declares the position and
@@ -6,16 +6,16 @@ velocity errors that remain at that moment after aiding. A tilt also rotates the
 An attitude error rotates the arm over the whole aperture, mid-aperture included.
 
 A lever arm leads from the reference point of the navigation to the antenna's phase centre, in axes that turn with the
-body. These axes are along, cross and up of the velocity at every moment of the aperture; for a platform at rest they
-are the scene's axes. The antenna's position is the navigation's position plus R(τ)·l, with the arm l and the rotation
-R of the body. An error δl of the arm turns with the body, R(τ)·δl. It displaces the image, and defocuses it if the
-body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction in space, like the
-attitude error of a strapdown system with perfect gyros; this also holds where ψ acts on the specific force. A gyro
-bias ε makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
+body. At every moment of the aperture, these axes are along the velocity, across it, and up; for a platform at rest
+they are the scene's axes. The antenna's position is the position of the reference point plus R(τ)·l, where l is the
+arm and R the rotation of the body. An error δl of the arm turns with the body, R(τ)·δl. It displaces the image, and
+defocuses it if the body turns. An attitude error ψ moves the antenna by ψ × R(τ)·l. The error ψ keeps its direction
+in space, like the attitude error of a strapdown system with perfect gyros; this also holds where ψ acts on the
+specific force. A gyro bias ε makes the error grow as ψ = ε·τ; gyro noise makes it a random walk.
 
 The same ψ acts through the specific force and through the arm, so the row for an error of an inertial sensor includes
-both effects. A further row shows the effect of attitude through the arm alone; it is not included in any sum. Derived
-here.
+both effects. A further row shows the effect of attitude through the arm alone; it is not included in any sum. These
+relations are derived here, not taken from a publication.
 """
 
 import math
@@ -64,14 +64,14 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
-    """Axes (3, 3) along which a process of position noise moves each platform, by the platform's name."""
+    """Axes (3, 3) along which correlated position noise moves each platform, by the name of the platform."""
     return _PROCESSES[error.kind.name](mission, error)[1]
 
 
 def _declared_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
     """Process that the file declares for a platform or for both platforms, and its axes on each platform.
 
-    The axes are (3, 3) for each name of a platform.
+    The axes are returned as a mapping from the name of the platform to an array (3, 3).
     """
     motion: MotionError | CommonMotionError | None = mission.common_motion_error
     names: tuple[str, ...] = PLATFORMS
@@ -83,9 +83,10 @@ def _declared_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov
 
 
 def _log_process(mission: Mission, error: RandomError) -> tuple[GaussMarkov, dict[str, Floats]]:
-    """Process for the noise of a log, and its axes by the platform's name, for a single case.
+    """Gauss–Markov process for the noise of a trajectory log in a single case, and its axes on the platform.
 
-    The processor must use the fixes of the log without smoothing.
+    The axes are returned as a mapping from the name of the platform to an array (3, 3). The processor must use the
+    fixes of the log without smoothing.
     """
     path: FlownPath | None = getattr(mission.platforms, error.owner).path
     assert path is not None
@@ -121,7 +122,7 @@ def specific_force(mission: Mission, state: PlatformState) -> Vectors:
 def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> Floats:
     """Acceleration error per unit of a sensor error about or along each axis, (axes, 3, ...). [m/s²/unit]
 
-    `axes` (axes, 3, ...) are the unit vectors of the axes. `force` (3, ...) is the specific force. [m/s²] A tilt
+    `axes` (axes, 3, ...) are the unit vectors of the axes. `force` (3, ...) [m/s²] is the specific force. A tilt
     about an axis rotates the specific force. A scale factor error adds a fraction of the component of the specific
     force along the axis. Any other sensor error is an acceleration along the axis.
     """
@@ -133,7 +134,7 @@ def acceleration_errors(figure: InertialFigure, axes: Floats, force: Floats) -> 
 
 
 def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the errors of a platform's inertial sensor, declared or not; no errors if the platform has no sensor."""
+    """Yield the errors of a platform's inertial sensor, declared or not; nothing if the platform has no sensor."""
     error = seen.error(name)
     if error.imu is None:
         return
@@ -184,7 +185,7 @@ def _moves_by_imu(
 ) -> tuple[Moves, ...]:
     """Motion of a platform per unit of a sensor error, due to the acceleration error and to the lever arm.
 
-    `directions` (axes, 3, cases) is the acceleration error per unit about or along each axis. [m/s²/unit] `about`
+    `directions` (axes, 3, cases) [m/s²/unit] is the acceleration error per unit about or along each axis. `about`
     (axes, 3, cases) are the axes of the sensor error. `arm` (3, nodes, cases) is the lever arm [m]; None if the file
     states no arm.
     """
@@ -207,10 +208,10 @@ _inertial_phases: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.in
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerCase, ...]:
-    """Quadratic, cubic and remaining phase due to one unit of a sensor error, in the published model. [rad/unit]
+    """Quadratic, cubic and higher-order phase due to one unit of a sensor error, in the published model. [rad/unit]
 
-    `index` is the index of the sensor error in `INERTIAL_FIGURES`. `along` is the acceleration error per unit along
-    the line of sight at mid-aperture. [m/s²/unit]
+    `index` is the index of the sensor error in `INERTIAL_FIGURES`. `along` [m/s²/unit] is the acceleration error per
+    unit along the line of sight at mid-aperture.
     """
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
     return _inertial_phases(along, along, along, wavelength, T)[index]
@@ -219,7 +220,7 @@ def _at_mid_aperture(mission: Mission, index: int, along: PerCase) -> tuple[PerC
 def _moved_by_imu(seen: SensorCases, figure: InertialFigure, along: Floats) -> tuple[PerCase, PerCase]:
     """Sigmas of the displacement, east and north, per unit of a sensor error, in the published model. [m/unit]
 
-    `along` is the acceleration error per unit along the line of sight at mid-aperture. [m/s²/unit]
+    `along` [m/s²/unit] is the acceleration error per unit along the line of sight at mid-aperture.
     """
     fit = seen.exact.fit[:2]
     if figure.spreads:
@@ -236,7 +237,7 @@ def _over_aperture(
 ) -> RandomEffect:
     """Effect of one unit of a sensor error in the full model, along the exact paths.
 
-    `directions` (axes, 3, cases) is the acceleration error due to one unit on each axis. [m/s²/unit] The motion error
+    `directions` (axes, 3, cases) [m/s²/unit] is the acceleration error due to one unit on each axis. The motion error
     is computed for an aperture of 2 s. Its square is then scaled by a power of half the aperture time.
     """
     count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
@@ -253,8 +254,8 @@ def _over_aperture(
 def _walk_of(figure: InertialFigure, count: int) -> "_Walks":
     """Covariance of the position error that the noise of a sensor causes.
 
-    The position error is an integral of white noise. The noise is a white acceleration, or a white tilt rate whose
-    tilt rotates the specific force. `count` is the number of nodes.
+    The position error is a repeated integral of white noise. The noise is a white acceleration, or a white tilt rate;
+    in the second case the tilt rotates the specific force. `count` is the number of nodes.
     """
     return _walks(figure.integrals - 1, figure.integrals - 1, count)
 
@@ -276,7 +277,8 @@ def _courses(figure: InertialFigure, count: int) -> Floats:
 def body_axes(state: PlatformState, times: Floats) -> Floats:
     """Body axes of a platform at slow times [s], as unit vectors in the axes of the scene, (axes, 3, *times.shape).
 
-    The axes are along, cross and up of the velocity. For a platform at rest they are the axes of the scene.
+    The axes are along the velocity, across it to the left, and up. For a platform at rest they are the axes of the
+    scene.
     """
     velocity = np.array([np.broadcast_to(component, times.shape) for component in state.at(times)[1]])
     return body_axes_of(velocity, state.is_still)
@@ -299,7 +301,7 @@ def body_axes_of(velocity: Floats, is_still: PerCaseFlag) -> Floats:
 def arm_at(state: PlatformState, arm: Vectors, times: Floats) -> Floats:
     """Lever arm at slow times [s] in the axes of the scene, (3, *times.shape). [m]
 
-    `arm` has the components of the lever arm along the body axes. [m]
+    `arm` [m] has the components of the lever arm along the body axes.
     """
     return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
 
@@ -356,10 +358,11 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _with_arm(
     seen: SensorCases, platform_index: int, figure: InertialFigure, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
-    """Effects of one unit of tilt, tilt rate or tilt noise on a platform with a lever arm: published and full model.
+    """Effects, in both models, of one unit of tilt, tilt rate or tilt noise on a platform with a lever arm.
 
-    The tilt is about the axes `about`, (axes, 3, cases). `directions` (axes, 3, cases) is the acceleration error due
-    to the tilt of the specific force. [m/s²/unit] `arm` (3, nodes, cases) is the lever arm at the nodes. [m]
+    The tilt is about the axes `about`, (axes, 3, cases). `directions` (axes, 3, cases) [m/s²/unit] is the
+    acceleration error due to the tilt of the specific force. `arm` (3, nodes, cases) [m] is the lever arm at the
+    nodes over the aperture. The effect in the published model is returned first.
     """
     state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
@@ -397,9 +400,9 @@ class _Walks(NamedTuple):
 
     The noise is integrated once or several times, see `_walks`. Both integrals start at mid-aperture and run forward
     and backward in time. `at_nodes` (nodes, nodes) is the covariance of the first integral with the second at the
-    nodes, in the Legendre orders that the nodes can distinguish. `left` is the expected product of the two integrals,
-    averaged over the aperture, after Legendre orders 0 to 3 are removed from both. `beyond` is the same average after
-    every order that the nodes can distinguish is removed.
+    nodes over the aperture, limited to the Legendre orders that the nodes can distinguish. `left` is the expected
+    product of the two integrals, averaged over the aperture, after Legendre orders 0 to 3 are removed from both.
+    `beyond` is the same average after every order that the nodes can distinguish is removed.
     """
 
     at_nodes: Floats
@@ -461,17 +464,17 @@ def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def residual_subject(name: str) -> Subject:
-    """Subject of the error due to the residuals of a platform's log about the smooth path."""
+    """Subject of the error due to the residuals of a platform's log about the smooth path fitted to it."""
     return subject(name, TRAJECTORY_KIND.name, "residual")
 
 
 def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the noise of a platform's log if the processor uses its fixes without smoothing; otherwise no errors.
+    """Yield the noise of a platform's log if the processor uses its fixes without smoothing; otherwise nothing.
 
     A Gauss–Markov process represents the residual of the fixes about the smooth path. It has the covariance and the
     correlation time of the residual. Independent fixes that are joined by straight lines are correlated over half an
-    interval. Like any noise, the process displaces and defocuses the image by its low orders, and spreads power by
-    its higher orders.
+    interval. Like any noise, the process displaces and defocuses the image by its low Legendre orders, and spreads
+    power by its higher orders.
 
     The fixes are rounded to a grid with the step q. The rounding error is uniformly distributed over a step and has
     the variance q²/12 along each coordinate. If the platform crosses many steps within the aperture, the rounding
@@ -491,10 +494,10 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, PerCase]]:
-    """Sigmas, axes and correlation time of the noise of a log, for its two parts `residual` and `grid`.
+    """Sigmas, axes and correlation time of the noise of a trajectory log, for its parts `residual` and `grid`.
 
-    `residual` is the noise of the fixes, and `grid` their rounding to a grid. Each has sigmas (3, cases) [m], axes
-    (3, 3, cases) and a correlation time [s].
+    `residual` is the noise of the fixes, and `grid` is their rounding to a grid. Each part has sigmas (3, cases) [m],
+    axes (3, 3, cases) and a correlation time [s].
     """
     residual, grid = (
         np.moveaxis(
@@ -518,8 +521,8 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Per
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
     """Yield an error for each process of correlated noise that both platforms share.
 
-    The noise along an axis of the frame moves both platforms, and its effects on both legs add with their signs.
-    Noise along different axes is independent.
+    The noise along an axis of its frame moves both platforms, and its effects on both legs add with their signs.
+    Noise along different axes is independent. A leg is the path between a platform and the scene.
     """
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):

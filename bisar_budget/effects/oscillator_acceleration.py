@@ -9,9 +9,9 @@ of both vectors.
 - Random vibration causes the phase spectrum S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
 - A clock is assumed to be set in level flight. In a turn, the specific force changes by the acceleration of the path.
   The range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)). A constant acceleration causes a frequency offset, which displaces
-  the image; a change of the acceleration within the aperture defocuses it. The root-sum-square of the effects of a Γ
-  along each of three axes is the largest effect that a Γ of that length has in any direction. A platform in free fall
-  has no specific force.
+  the image; a change of the acceleration within the aperture defocuses it. The effect is computed for a Γ along each
+  of three axes, and the root-sum-square of the three effects is the effect in the worst direction of Γ. A platform in
+  free fall has no specific force.
 """
 
 import math
@@ -42,7 +42,7 @@ _EXCHANGE_START_COUNT = 8  # start times of the exchanges, over which the effect
 class Felt(NamedTuple):
     """Vibration that acts on an oscillator, and the oscillator's acceleration sensitivity. [s²/m]
 
-    `is_own` is true if the file states the vibration for the oscillator, and false if it states it for the platform.
+    `is_own` tells whether the file states the vibration for the oscillator itself, and not for its platform.
     """
 
     vibration: Vibration | FeltVibration
@@ -51,7 +51,10 @@ class Felt(NamedTuple):
 
 
 def felt(mission: Mission, name: str) -> Felt | None:
-    """Vibration and acceleration sensitivity of a platform's oscillator; None if the file states no sensitivity."""
+    """Vibration that a platform's oscillator feels, and its sensitivity to acceleration.
+
+    The result is None if the file states no sensitivity.
+    """
     platform = getattr(mission.platforms, name)
     oscillator: Oscillator | None = platform.oscillator
     if oscillator is None or oscillator.acceleration_sensitivity is None:
@@ -96,10 +99,10 @@ class AcceleratedTone(NamedTuple):
     """Tone in the phase of an oscillator that a sinusoidal vibration causes.
 
     `name` is the platform, and `entry` the index of the vibration in the file. `frequency` is in Hz, and
-    `acceleration` is the amplitude of the acceleration. [m/s²] `free` is the peak phase without synchronization at
-    the radar's centre frequency, per unit of the sensitivity Γ. [rad/(s²/m)] `sensitivity` is Γ. [s²/m] `left` are
-    the tones that synchronization leaves of a tone of amplitude 1, and `echo` is the amplitude with which these
-    residual tones make echoes.
+    `acceleration` [m/s²] is the amplitude of the acceleration. `free` [rad/(s²/m)] is the peak phase before
+    synchronization, at the radar's centre frequency and per unit of the sensitivity Γ. `sensitivity` [s²/m] is Γ.
+    `left` are the residual tones after synchronization, for a tone of amplitude 1. `echo` is the amplitude of the
+    residual tones that cause paired echoes in the image.
 
     `in_quadrature` is the id of the row of the platform's vibration that causes the tone. The tone is a quarter cycle
     out of phase with that vibration. `in_quadrature` is None for a vibration along several axes, and for a vibration
@@ -123,21 +126,24 @@ class AcceleratedTone(NamedTuple):
 
     @property
     def per_unit(self) -> PerCase:
-        """Peak phase of the tone's echo at the centre frequency per unit of Γ. [rad/(s²/m)]"""
+        """Peak phase per unit of Γ of the residual tone that causes paired echoes. [rad/(s²/m)]
+
+        It applies at the radar's centre frequency.
+        """
         return self.free * self.echo
 
     @property
     def phase(self) -> PerCase:
-        """Peak phase of the tone's echo at the centre frequency. [rad]"""
+        """Peak phase of the residual tone that causes paired echoes, at the radar's centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
 
 def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
     """List the tones that sinusoidal vibrations cause in the oscillators of the platforms.
 
-    With a direct path as clock, only the receiver's tones are listed. They enter both the direct path and the echo.
-    If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By default it is the
-    mission's own geometry.
+    If a direct path synchronizes the clocks, only the receiver's tones are listed. They are in the direct signal and
+    in the radar echo. If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By
+    default it is the mission's own geometry.
     """
     tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
@@ -161,11 +167,11 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the error of an oscillator under acceleration; no error if the file states no sensitivity.
+    """Yield the error of an oscillator under acceleration; nothing if the file states no sensitivity.
 
     The error includes the effects of random vibration, of tones below one cycle per aperture, and of turns of the
-    platform. Faster tones have rows of their own. The declared size is the sensitivity Γ, coverage factor included.
-    [s²/m]
+    platform. Faster tones have rows of their own. The declared size is the sensitivity Γ [s²/m], including the
+    coverage factor.
     """
     felt_vibration = felt(seen.mission, name)
     if felt_vibration is None:
@@ -185,7 +191,7 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     """Mean squares of the Legendre parts of the range error due to vibration, per squared unit of Γ. [m²/unit²]
 
-    They are sums over the vibration spectrum and the slow tones, each tone in its worst phase.
+    They are sums over the vibration spectrum and the slow tones. Each tone is taken in its worst phase.
     """
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
@@ -203,7 +209,7 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
-    """Effects of a path's acceleration on the oscillator per unit of Γ: in the published and in the full model.
+    """Effects of a path's acceleration on the oscillator per unit of Γ, in the published and in the full model.
 
     Γ is the acceleration sensitivity. The result is None for a path without acceleration and for a path in free fall,
     where no acceleration acts on the oscillator.
@@ -223,7 +229,7 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
     """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (3, moments, …). [s/(s²/m)]
 
-    `moments` are slow times. [s] If the clocks exchange pulses at an `interval` [s], the result is the remainder
+    `moments` [s] are slow times. If the clocks exchange pulses at an `interval` [s], the result is the remainder
     after synchronization. The first exchange may be at any time within an interval, so the remainders for several
     start times are returned, (3 · start times, moments, …). They are scaled so that the sum of their squares is the
     mean square over the start times.
@@ -277,7 +283,7 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
     """Phase spectrum of an oscillator under random vibration, per squared unit of Γ. [rad²/Hz/unit²]
 
-    Empty if no spectrum acts on the oscillator.
+    The result is empty if no vibration spectrum acts on the oscillator.
     """
     felt_vibration = felt(mission, name)
     is_heard = not mission.has_direct_path or name == "receiver"

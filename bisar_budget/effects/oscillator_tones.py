@@ -1,10 +1,11 @@
-"""Tones in the phase of oscillators: spurs, and the residual tones that synchronization leaves of a tone.
+"""Tones in the phase of oscillators: spurs, and the residual tones into which synchronization turns a tone.
 
 The exchanges of pulses, at intervals T_s, sample a tone at frequency f. Between the samples, the phase is
 interpolated linearly. The interpolated phase contains tones at f + m/T_s. Their amplitudes are sinc²((f + m/T_s)·T_s)
-times the amplitude of the original tone. When the interpolated phase is subtracted, 1 − sinc²(fT_s) of the amplitude
-remains at f (m = 0). The tones with m ≠ 0 are the frequencies to which the tone is folded. The phases of the folded
-tones depend on the unknown instant of the exchange within its interval. Derived here.
+times the amplitude of the original tone. When the interpolated phase is subtracted, the fraction 1 − sinc²(fT_s) of
+the amplitude remains at f (m = 0). The tones with m ≠ 0 are at the frequencies to which the tone is folded. The
+phases of the folded tones depend on the unknown instant of the exchange within its interval. These relations are
+derived here, not taken from a publication.
 """
 
 import math
@@ -26,10 +27,10 @@ _NEIGHBOUR_RATE_COUNT = (
 
 
 class LeftTone(NamedTuple):
-    """Residual tones that synchronization leaves of a tone of amplitude 1.
+    """Residual tones after synchronization, for an original tone of amplitude 1.
 
-    `frequencies` has the tone's own frequency first, and then the frequencies to which it is folded. [Hz] `shares`
-    are the amplitudes of the residual tones; 0 for a frequency that does not occur.
+    `frequencies` [Hz] has the frequency of the original tone first, and then the frequencies to which it is folded.
+    `shares` are the amplitudes of the residual tones; 0 for a frequency that does not occur.
     """
 
     frequencies: tuple[PerCase, ...]
@@ -41,10 +42,10 @@ class LeftTone(NamedTuple):
         return len(self.shares) > 1
 
     def echoes(self, aperture_time: PerCase) -> list[PerCase]:
-        """Amplitudes with which the residual tones make echoes.
+        """Amplitudes of the residual tones that cause paired echoes in the image.
 
-        A folded tone below one cycle per aperture makes no echo, so its amplitude is 0. A tone that is not folded
-        keeps its amplitude at any frequency.
+        A folded tone below one cycle per aperture causes no paired echoes, so its amplitude is returned as 0. A tone
+        that is not folded keeps its amplitude at any frequency.
         """
         if not self.is_folded:
             return [self.shares[0]]
@@ -54,7 +55,7 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> PerCase:
-        """Amplitude with which the residual tones make echoes.
+        """Combined amplitude of the residual tones that cause paired echoes in the image.
 
         With a PSLR requirement it is the amplitude of the tone that makes the largest echo. Without this requirement
         it is the root-sum-square of the amplitudes of all tones that make echoes.
@@ -67,9 +68,10 @@ class LeftTone(NamedTuple):
         return largest
 
     def slowest_echo(self, aperture_time: PerCase) -> PerCase:
-        """Lowest frequency of the residual tones that make echoes with more than 1 % of the original amplitude. [Hz]
+        """Lowest frequency of the residual tones that make paired echoes. [Hz]
 
-        For a tone that is not folded it is the tone's own frequency. It is infinite if no tone makes such an echo.
+        Tones with less than 1 % of the original amplitude are ignored. For a tone that is not folded, the result is
+        the tone's own frequency. It is infinite if no tone makes such an echo.
         """
         if not self.is_folded:
             return self.frequencies[0]
@@ -80,17 +82,17 @@ class LeftTone(NamedTuple):
         return slowest
 
     def place(self, aperture_time: PerCase) -> PerCase:
-        """Frequency of the residual tone that makes the largest echo. [Hz]"""
+        """Frequency of the residual tone that makes the largest paired echo in the image. [Hz]"""
         both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
         echoes, frequencies = np.split(both, 2)
         of_largest: PerCase = np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
         return of_largest
 
     def slow_parts(self, aperture_time: PerCase) -> Parts:
-        """Squared Legendre parts, over the aperture, of summed residual tones below one cycle per aperture. [rad²]
+        """Squared Legendre parts, over the aperture, of the sum of the slow residual tones. [rad²]
 
-        Each tone is taken in its worst phase. The residual tones are not independent of each other, so the amplitudes
-        of their parts add.
+        Slow tones have less than one cycle per aperture. Each tone is taken in its worst phase. The residual tones
+        are not independent of each other, so the amplitudes of their parts add.
         """
         total: Floats = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
@@ -106,10 +108,11 @@ class LeftTone(NamedTuple):
 
 
 def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
-    """Residual tones that synchronization leaves of a tone of amplitude 1 at a given frequency. [Hz]
+    """Residual tones after synchronization, for an original tone of amplitude 1 at the given frequency [Hz].
 
-    With a direct path, the receiver's tone remains with the amplitude 2|sin(πfΔt)|, where Δt is the delay of the echo
-    after the direct path. Without a direct path or an exchange of pulses the tone remains unchanged.
+    If a direct path synchronizes the clocks, the receiver's tone remains with the amplitude 2|sin(πfΔt)|, where Δt is
+    the delay of the radar echo after the direct signal. If there is neither a direct path nor an exchange of pulses,
+    the tone remains unchanged.
     """
     sync = mission.synchronization
     if mission.has_direct_path:
@@ -130,9 +133,9 @@ def left_of_tone(frequency: PerCase, mission: Mission, geometry: BistaticGeometr
 class Spur(NamedTuple):
     """Spur of an oscillator: name of the platform, index of the spur in the file, and frequency [Hz].
 
-    `free` is the peak phase at the radar's centre frequency without synchronization. [rad] `left` are the tones that
-    synchronization leaves of a tone of amplitude 1. `echo` is the amplitude with which these residual tones make
-    echoes.
+    `free` [rad] is the peak phase before synchronization, at the radar's centre frequency. `left` are the residual
+    tones after synchronization, for a tone of amplitude 1. `echo` is the amplitude of the residual tones that cause
+    paired echoes in the image.
     """
 
     name: str
@@ -149,13 +152,13 @@ class Spur(NamedTuple):
 
     @property
     def phase(self) -> PerCase:
-        """Peak phase of the spur's echo at the radar's centre frequency. [rad]"""
+        """Peak phase of the residual tones that cause paired echoes, at the radar's centre frequency. [rad]"""
         return self.free * self.echo
 
     def slow_parts(self, aperture_time: PerCase) -> Parts | None:
         """Squared Legendre parts, over the aperture, of the spur's tones below one cycle per aperture. [rad²]
 
-        None if the synchronization does not fold the spur.
+        The result is None if the synchronization does not fold the spur.
         """
         if not self.left.is_folded:
             return None
@@ -165,9 +168,9 @@ class Spur(NamedTuple):
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
     """List the spurs of oscillators that reach the image.
 
-    With a direct path as clock, only the receiver's spurs are listed. They enter both the direct path and the echo.
-    If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By default it is the
-    mission's own geometry.
+    If a direct path synchronizes the clocks, only the receiver's spurs are listed. They are in the direct signal and
+    in the radar echo. If numbers of the mission are arrays over cases, `geometry` is the geometry of all cases. By
+    default it is the mission's own geometry.
     """
     spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:

@@ -48,7 +48,7 @@ class Noise(NamedTuple):
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """Phase-noise spectrum of an oscillator at a given centre frequency, one-sided. [rad²/Hz]
+    """One-sided phase-noise spectrum of an oscillator at a given centre frequency. [rad²/Hz]
 
     `center_frequency` is in Hz, and `aperture_time` in s. The `level` of the oscillator in dB scales the spectrum. A
     power law that is fitted to an Allan deviation may depend on the aperture time, see `fitted`.
@@ -74,7 +74,7 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 
 
 def noise_in_case(mission: Mission, name: str) -> Noise:
-    """Phase-noise spectrum of a platform's oscillator at the radar's centre frequency, one-sided. [rad²/Hz]
+    """One-sided phase-noise spectrum of a platform's oscillator at the radar's centre frequency. [rad²/Hz]
 
     `mission` is the mission of a single case, so its numbers are not arrays. `name` is the name of the platform.
     """
@@ -111,7 +111,7 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[PowerLawPiece, ...]:
     """Convert a power law S_y of fractional frequency to the phase spectrum S_φ = f₀²·S_y/f². [rad²/Hz]
 
-    f₀ is the centre frequency. [Hz] The spectrum extends from 0 Hz to `bandwidth`. [Hz] The result has a piece for
+    f₀ [Hz] is the centre frequency. The spectrum extends from 0 Hz to `bandwidth` [Hz]. The result has a piece for
     each nonzero coefficient of the power law.
     """
     square = center_frequency**2
@@ -123,9 +123,9 @@ def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> t
 
 
 def allan_variances(tau: float, bandwidth: float) -> tuple[float, ...]:
-    """Allan variances due to the power-law coefficients h₋₂, h₋₁, h₀, h₁ and h₂, each with the value 1, (5,).
+    """Allan variances, (5,), due to each of the power-law coefficients h₋₂, h₋₁, h₀, h₁ and h₂ with the value 1.
 
-    `tau` is the averaging time. [s] `bandwidth` is the bandwidth of the measurement. [Hz]
+    `tau` [s] is the averaging time. `bandwidth` [Hz] is the bandwidth of the measurement.
     """
     return (
         2 * math.pi**2 / 3 * tau,
@@ -147,9 +147,9 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     """Fit a power law with non-negative coefficients h₋₂ … h₁ to an Allan deviation.
 
     `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz, and `aperture_time` in s. The
-    fit minimises the squares of the relative errors of the Allan variances. It uses the smallest number of terms that
-    describe the points. Several sets of terms may describe the points almost equally well. The fit then uses the set
-    with the largest quadratic phase over the aperture.
+    fit minimises the squares of the relative errors of the Allan variances. It uses only as many terms as are needed
+    to describe the points. Several sets of terms may describe the points almost equally well. The fit then uses the
+    set with the largest quadratic phase over the aperture.
     """
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
@@ -169,8 +169,8 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
 def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
     """Fit each set of power-law terms to an Allan deviation, and keep the fits with only positive coefficients.
 
-    `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz. The fits with the same number
-    of terms form one tuple. A number of terms without any such fit has no tuple.
+    `points` are pairs of averaging time [s] and Allan deviation. `bandwidth` is in Hz. The result has one tuple for
+    each number of terms, with the fits that use this number. A number of terms without any such fit is left out.
     """
     # White and flicker phase noise have nearly the same Allan variance: the fifth term is left out.
     term_count = 4
@@ -219,7 +219,7 @@ def _misfit(relative: Floats, law: Sequence[float]) -> float:
 
 # ---------------------------------------------------------------------- errors of clocks
 def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
-    """Names of platforms whose clocks run free after they were set, but whose oscillators the file does not state.
+    """Names of the platforms whose clocks run free after they are set, but whose oscillators are not in the file.
 
     The random drift of such a clock is unknown, so its contribution is missing from the location budget.
     """
@@ -260,9 +260,9 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerCase) -> RandomEffect | None:
-    """Effect of the noise that is assumed below the first point of a mask; None if it is negligible.
+    """Effect of the noise that is assumed below the first point of a mask; None if the noise is negligible.
 
-    The effect is computed by the full model and includes the coverage factor. `scale` is the square of the centre
+    The effect is computed with the full model and includes the coverage factor. `scale` is the square of the centre
     frequency in Hz, multiplied by the level of the oscillator. The result is also None for an oscillator that is not
     stated by a mask.
     """
@@ -278,8 +278,8 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Booleans:
     """Mark the cases in which the spectrum used for an oscillator may differ from its actual spectrum, (cases,).
 
     A case is marked if the power law fits the Allan deviation poorly. All cases are marked if the file overrides the
-    mask of a part with a mask for which it states no frequency. Such a mask is assumed to apply at the frequency of
-    the part.
+    mask of a catalogue part with a mask for which it states no frequency. Such a mask is assumed to apply at the
+    frequency of the catalogue part.
     """
     in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
@@ -303,12 +303,12 @@ def states_both_terms(mission: Mission) -> bool:
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects of a clock's phase error in the published and in the full model.
 
-    `noise` and `tones` are the mean squares of the Legendre parts of its noise and of its slow tones over the
-    aperture. [rad²] Orders 0 and 1 of the noise are included if they are finite. If they are not, the displacement is
-    unknown and is NaN. It is 0 if orders 2 and 3 are 0 as well. If the file states the constant and the linear term
-    of the clock, these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the slow tones are then still
-    included. If the line of sight turns, orders 2 and 3 also displace the image, which reduces the defocus that they
-    cause.
+    `noise` and `tones` [rad²] are the mean squares of the Legendre components of the clock's noise and of its slow
+    tones over the aperture. Orders 0 and 1 of the noise are included if they are finite. Otherwise the displacement
+    is unknown and is NaN, except that it is 0 if the quadratic and cubic phases are 0. If the file states the
+    constant and the linear term of the clock, these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the
+    slow tones are then still included. If the line of sight turns, orders 2 and 3 also displace the image, which
+    reduces the defocus that they cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -337,8 +337,8 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 
     The remaining phase depends on how the clocks are synchronized. For free clocks, all of the noise remains. If the
     clocks exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the
-    noise since the setting remains. If the receiver uses the direct path, the change of the receiver's noise between
-    the arrivals of direct signal and echo remains, and no noise of the transmitter.
+    noise since the setting remains. If the receiver uses the direct path, no noise of the transmitter remains, and
+    for the receiver only the change of its noise between the arrivals of direct signal and echo.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
     remaining = np.zeros((len(Parts._fields), seen.cases))
@@ -360,9 +360,9 @@ def _left_of(
 ) -> Parts:
     """Mean squares of the parts of the phase that remains after synchronization, from a phase spectrum. [rad²]
 
-    `pieces` are the pieces of the spectrum. `interval` is the interval of exchanged pulses [s]; None without
-    exchanges. `cases_of_spectrum` are the indices of the cases that have the spectrum. Each field of the result has
-    the shape (len(cases_of_spectrum),).
+    `pieces` are the pieces of the spectrum. `interval` is the interval of exchanged pulses [s]; None if there are no
+    exchanges. `cases_of_spectrum` are the indices of the cases to which the spectrum applies. Each field of the
+    result has the shape (len(cases_of_spectrum),).
     """
     sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:

@@ -2,8 +2,8 @@
 
 A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹. Orders
 2 and higher defocus the image. The published model uses the line of sight at mid-aperture (`theory.random_errors`)
-and the matrix Q of (25). The full model includes the turn of the line of sight, a direct path from transmitter to
-receiver, and the phase that the displacement adds.
+and the matrix Q of equation (25). The full model includes the turn of the line of sight, a direct path from
+transmitter to receiver, and the phase that the displacement adds.
 
 The numbers in a mission may be arrays (cases,). The geometry then has the same cases.
 """
@@ -54,17 +54,21 @@ Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
 class RandomEffect(NamedTuple):
     """Effect of one unit of a random error on the image: sigmas of phases and displacement, and their covariance.
 
-    `quadratic` and `cubic` are the phases at the aperture edge. [rad/unit] `spread` is the rms phase beyond the
-    cubic. [rad/unit] It represents a mean power, so it never includes the coverage factor. `east` and `north` are the
-    sigmas of the displacement. [m/unit] They are NaN if the displacement is unknown, as for a free oscillator.
+    `quadratic` and `cubic` [rad/unit] are the phases at the aperture edge. `spread` [rad/unit] is the rms phase
+    beyond the cubic. It represents a mean power, so it never includes the coverage factor. `east` and `north`
+    [m/unit] are the sigmas of the displacement. They are NaN if the displacement is unknown, as for a free
+    oscillator.
 
     `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
-    the products of their units. It is None in the published model, which has only the sigmas. `hidden` is the hidden
-    phase: the quadratic phase that lowers the peak as much as the range error that the displacement cannot remove,
-    mainly a constant and a linear part. [rad/unit] Autofocus cannot correct it, see `ranges.exact_ranges`.
+    the products of their units. It is None in the published model, which has only the sigmas.
 
-    `rest` is the rms phase beyond the cubic of an error that is not noise, such as a bias. [rad/unit] It is the value
-    at one sigma, without the coverage factor. It spreads power like the phase beyond the cubic of any motion error.
+    `hidden` [rad/unit] is the hidden phase. For any displacement of the image, a part of the range error remains,
+    mainly constant and linear in time. The hidden phase is the quadratic phase that lowers the peak as much as this
+    part does. Autofocus cannot correct it, see `ranges.exact_ranges`.
+
+    `rest` [rad/unit] is the rms phase beyond the cubic for an error that is not noise, such as a bias. It is the
+    value at one sigma, without the coverage factor. It spreads power, as does the phase beyond the cubic due to any
+    motion error.
     """
 
     quadratic: Any
@@ -77,10 +81,10 @@ class RandomEffect(NamedTuple):
     rest: Any = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase per unit of the error that is compared with a limit including the autofocus gain `gain`. [rad/unit]
+        """Phase per unit of error, for comparison with a limit that includes the autofocus gain. [rad/unit]
 
-        The limit is raised for the hidden phase too, although autofocus does not correct it. The hidden phase is
-        therefore multiplied by the gain. See `Declared.judged`.
+        `gain` is the autofocus gain. The limit is raised for the hidden phase too, although autofocus does not
+        correct it. The hidden phase is therefore multiplied by the gain. See `Declared.judged`.
         """
         phase: PerCase = np.hypot(self.quadratic, gain * self.hidden)
         return phase
@@ -92,9 +96,9 @@ class RandomEffect(NamedTuple):
         return length
 
     def of(self, case: int) -> "RandomEffect":
-        """Return the effect in one case in plain numbers.
+        """Return the effect in the case with the given index, as plain numbers.
 
-        `case` is the index of the case. The covariance is (4, 4), or None if the effect has no covariance.
+        The covariance is (4, 4), or None if the effect has no covariance.
         """
         covariance = self.covariance
         if covariance is not None:
@@ -104,7 +108,7 @@ class RandomEffect(NamedTuple):
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
     def times(self, factor: PerCase) -> "RandomEffect":
-        """Multiply the phases and the displacement by a coverage factor, and the covariance by its square.
+        """Multiply the phases and the displacement by a coverage factor, and their covariance by its square.
 
         `spread` and `rest` do not change.
         """
@@ -123,13 +127,13 @@ class RandomEffect(NamedTuple):
 class Moves(NamedTuple):
     """Motion of a platform due to one unit (1 sigma) of a random error.
 
-    `place` is the index of the platform. `ways` (ways, 3, nodes or 1, cases) are vectors along which the platform
-    moves. [m/unit] `courses` (courses, nodes, cases or 1) are variations over the aperture, at the nodes of
+    `place` is the index of the platform. `ways` (ways, 3, nodes or 1, cases) [m/unit] are vectors along which the
+    platform moves. `courses` (courses, nodes, cases or 1) are variations over the aperture, at the nodes of
     `SensorCases.exact`.
 
-    Each pair of a vector from `ways` and a variation from `courses` has an independent random number of variance 1.
-    The motion is the sum over all pairs of random number times vector times variation. If an error has several
-    `Moves`, the same pair of indices has the same random number in each.
+    Each pair of a vector v from `ways` and a variation s from `courses` has its own independent random number x of
+    variance 1. The motion is the sum of x·v·s over all pairs. If an error has several `Moves`, pairs with the same
+    indices have the same random number in each of them.
     """
 
     place: int
@@ -194,7 +198,8 @@ class RandomError(NamedTuple):
     def is_covered(self) -> bool:
         """Whether the declared size or its effect includes the coverage factor.
 
-        False only for an error of the kind `other`, for which the file states an effect determined elsewhere.
+        It is false only for an error of the kind `other`, for which the file states an effect that the user has
+        determined.
         """
         return self.kind.is_covered
 
@@ -216,14 +221,14 @@ class RandomError(NamedTuple):
         return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
 
     def effect(self, model: str) -> RandomEffect:
-        """Effect of one unit in the model with the given name, `full` or `published`."""
+        """Effect of one unit of the error in the model with the given name, `full` or `published`."""
         return self.full if model == "full" else self.published
 
 
 class SensorCases:
     """Geometry and exact ranges of many cases, from which the effects of random errors are computed.
 
-    The last axis of each array has the cases.
+    The last axis of each array is the axis of cases.
     """
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
@@ -245,7 +250,7 @@ class SensorCases:
         return numbers
 
     def error(self, name: str) -> MotionError:
-        """Declared motion error of the platform `name`."""
+        """Motion error that the mission declares for the platform with the given name."""
         motion_error: MotionError = getattr(self.mission.platforms, name).motion_error
         return motion_error
 
@@ -275,7 +280,7 @@ class SensorCases:
 
     @cached_property
     def weights(self) -> Floats:
-        """Effects on the image per metre of range error at each node, (8, nodes, cases), see `effect_weights`."""
+        """Effects on the image per metre of range error at each node, (8, nodes, cases); see `effect_weights`."""
         return effect_weights(self.exact)
 
     @cached_property
@@ -341,8 +346,8 @@ class SensorCases:
     def of_process(self, covariance: Floats, beyond: PerCase) -> RandomEffect:
         """Effect, in the full model, of a random range error with a given covariance over the aperture.
 
-        `covariance` (nodes, nodes, cases) is the covariance of the range error between the nodes. [m²] `beyond`
-        (cases,) is its mean square in the orders that the nodes cannot distinguish. [m²] See `effects_of_process`.
+        `covariance` (nodes, nodes, cases) [m²] is the covariance of the range error between the nodes. `beyond`
+        (cases,) [m²] is its mean square in the orders that the nodes cannot distinguish. See `effects_of_process`.
         """
         return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
 
@@ -355,24 +360,24 @@ class SensorCases:
     def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """Effects, in the published and in the full model, of independent random position errors of a platform.
 
-        `moved` (errors, 3, nodes, cases) are the position errors at the nodes. [m/unit]
+        `moved` (errors, 3, nodes, cases) [m/unit] are the position errors at the nodes over the aperture.
         """
         look = self.vector(self.geometry.both[platform_index].look)
         return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
     def range_errors(self, platform_index: int, moved: Floats) -> Floats:
-        """Range errors at the nodes due to small position errors of a platform, (errors, nodes, cases). [m]
+        """Range errors over the aperture due to small position errors of a platform, (errors, nodes, cases). [m]
 
-        `moved` (errors, 3, nodes or 1, cases) are the position errors. [m]
+        `moved` (errors, 3, nodes or 1, cases) [m] are the position errors.
         """
         x, y, z = np.moveaxis(moved, 1, 0)
         return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
-        """Sigmas of the displacement east and north due to a random range error, according to (25). [m]
+        """Sigmas of the displacement east and north due to a random range error, by equation (25). [m]
 
-        `constant` and `linear` are the mean squares of the constant and the linear part of the range error at the
-        aperture edge. [m²] `both` is the mean product of the two parts. [m²] The sigmas are NaN where the matrix Q is
+        `constant` and `linear` [m²] are the mean squares of the constant and the linear part of the range error at
+        the aperture edge. `both` [m²] is the mean product of the two parts. The sigmas are NaN where the matrix Q is
         singular.
         """
         half = self.aperture_time / 2
@@ -386,7 +391,7 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Legendre polynomials of order 0 to 3 at the nodes, (nodes, 4), scaled as in `orders_at`.
+        """Legendre polynomials of order 0 to 3 at the nodes over the aperture, (nodes, 4), scaled as in `orders_at`.
 
         The leading term of each polynomial has the size 1 at the aperture edge.
         """
@@ -395,10 +400,11 @@ class SensorCases:
     def of_orders(self, covariance: Floats, along: PerCase = 1.0) -> tuple[Sequence[Floats], Floats]:
         """Sigmas and covariance of the effects of random errors, from the covariance of their Legendre orders 0 to 3.
 
-        The result is described in the function `sigmas`. `covariance` (4, 4, ...) is the covariance of the orders of
-        each error at the aperture edge. [m²] The errors are independent. `along` (errors, nodes, cases) is the change
-        of the range per metre of each error. Orders above 3 are not included. They defocus and displace the image
-        only to second order in the angle by which the line of sight turns.
+        The result has the form described in the function `sigmas`. Each error is a random combination of the
+        polynomials in `orders`. `covariance` (4, 4, ...) [m²] is the covariance of the four coefficients; it is the
+        same for all errors, and the errors are independent of each other. `along` (errors, nodes, cases) is the
+        change of the range per metre of each error. Orders above 3 are not included. They defocus and displace the
+        image only to second order in the angle by which the line of sight turns.
         """
         covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
         covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
@@ -409,10 +415,11 @@ class SensorCases:
         return sigmas(total, np.einsum("ffc->fc", total))
 
     def courses(self, covariance: Floats) -> Floats:
-        """Variations over the aperture whose random sum has a given covariance of the Legendre orders 0 to 3.
+        """Variations over the aperture that represent a random error with a given covariance.
 
-        The sum multiplies each variation by an independent random number of variance 1. `covariance` is (4, 4, ...).
-        The result is (4, nodes, ...), in the square root of the unit of `covariance`.
+        The random error is the sum of the variations, each multiplied by an independent random number of variance 1.
+        `covariance` (4, 4, ...) is the covariance of the coefficients with which the error combines the polynomials
+        in `orders`. The result is (4, nodes, ...), in the square root of the unit of `covariance`.
         """
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
@@ -420,7 +427,7 @@ class SensorCases:
     def of_parts(self, noise: Parts, along: PerCase = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
         """Effects, in both models, of noise with given mean squares of its Legendre parts over the aperture.
 
-        `noise` are the mean squares. [m²] `along` (nodes, cases) is the range error in the data per metre of the
+        `noise` [m²] are the mean squares. `along` (nodes, cases) is the range error in the data per metre of the
         noise. Orders 0 to 3 displace and defocus the image, and the part beyond them spreads power. The result is
         accurate to 5 % and 0.5 dB for a line of sight that turns by up to 1 rad. Over a full circle it has the same
         accuracy, with two exceptions: for noise as steep as f⁻⁴ the spread is wrong by 1 dB, and the location error
@@ -474,7 +481,7 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
-    """Largest of the values of all axes, (cases,), and the ratio of each value to it, (axes, cases).
+    """Largest value over all axes, (cases,), and the ratio of the value on each axis to it, (axes, cases).
 
     `values` (axes, cases) are not negative. The ratio is 1 where the largest value is 0.
     """
@@ -489,8 +496,8 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
     five sigmas: quadratic phase, cubic phase, displacement east, displacement north, and hidden phase. The hidden
     phase is the root-sum-square of its four parts.
 
-    Where terms cancel exactly, a variance is only rounding error. It is then small compared with the squared
-    magnitude in `sizes` (8, cases). Such a variance would give a limit where none exists, so it is set to 0.
+    If terms cancel exactly, a variance is only rounding error. It is then small compared with the squared magnitude
+    in `sizes` (8, cases). Such a variance is set to 0, because it would lead to a limit that does not exist.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes

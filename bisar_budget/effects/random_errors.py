@@ -42,8 +42,8 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
     The list is empty for most missions. For a platform with an inertial sensor, all errors of the sensor are listed,
     declared or not. For a platform with a lever arm, the effect of attitude errors through the arm is listed.
-    `geometry` is the geometry of many cases, and `cases` is their number. Without `geometry`, the errors are those of
-    a single case in plain floats.
+    `geometry` is the geometry of many cases, and `cases` is their number. Without `geometry`, the mission is a single
+    case, and the numbers of the errors are plain floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
@@ -62,7 +62,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
 
 
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
-    """Yield the errors for which the file states a cubic phase or a displacement determined elsewhere."""
+    """Yield the errors for which the file states only a cubic phase or a displacement, as determined by the user."""
     for index, stated in enumerate(mission.other_errors):
         for key, effect in _UNIT_EFFECTS.items():
             size = getattr(stated, key)
@@ -73,7 +73,7 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
-    """Return an error of many cases in plain numbers for one case, including the noise spectrum of an oscillator.
+    """Convert an error of many cases to plain numbers for one case, including the noise spectrum of an oscillator.
 
     `mission` is the mission of that case, and `case` is its index in the arrays of `error`.
     """

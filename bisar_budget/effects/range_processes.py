@@ -1,20 +1,21 @@
 """Random range errors along turning lines of sight, and their effects on the image.
 
-A range error is of one of two forms. It may be a known variation over the aperture times a random size, as for a
-bias. Or it is a random process that changes within the aperture, such as noise of a position, a random walk, or a
-delay of the air. Each effect on the image, a phase or a displacement, is an integral of a weight times the range
-error. The variance of the effect is therefore a double integral of the covariance of the range error.
+A range error has one of two forms. It is either a known variation over the aperture times a random size, as for a
+bias, or a random process that changes within the aperture, such as position noise, a random walk, or an atmospheric
+delay. Each effect on the image, a phase or a displacement, is an integral of a weight times the range error. The
+variance of the effect is therefore a double integral of the covariance of the range error.
 
-A process is resolved into as many Legendre orders as the nodes can distinguish. The weights are smooth and contain no
-higher orders, so the higher orders of a process only spread power. The resolved orders beyond the cubic spread power
-as well. If the line of sight turns, the displacement of the image adds further parts beyond the cubic.
+A process is decomposed into as many Legendre orders as the nodes over the aperture can distinguish. The weights are
+smooth and contain no higher orders, so the higher orders of a process only spread power. The decomposed orders above
+the cubic spread power as well. If the line of sight turns, the displacement of the image adds further parts beyond
+the cubic.
 
 A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1). The first term is the
 correlation of a constant error. The second term is called the departure. It is computed separately, so that it goes
 to zero without rounding error for a long correlation time.
 
-Derived here. Time series check it in `tests/effects/test_changing_air.py`. Random draws and direct sums check it in
-`tests/effects/test_long_noise.py`.
+This method is derived here, not taken from a publication. It is checked with time series in
+`tests/effects/test_changing_air.py`, and with random draws and direct sums in `tests/effects/test_long_noise.py`.
 """
 
 from functools import cache
@@ -34,8 +35,8 @@ _NODES_PER_OCTAVE = 20  # resolve the correlation within an octave of lags to 1e
 class RangeEffects(NamedTuple):
     """Second moments of the effects of random range errors on the image.
 
-    `covariance` (8, 8, cases) is the covariance of the effects, in the order of `effect_weights`. `left` (cases,) is
-    the mean square of the range error beyond the cubic. [m²]
+    `covariance` (8, 8, cases) is the covariance of the effects, in the order of `effect_weights`. `left` (cases,)
+    [m²] is the mean square of the range error beyond the cubic.
 
     `sizes` (8, cases) are the squares that the effects would have if the terms of their sums did not cancel. A
     variance that is very small compared with its value in `sizes` is only rounding error.
@@ -50,7 +51,7 @@ def effect_weights(exact: ExactRanges) -> Floats:
     """Effects on the image per metre of range error at each node, (8, nodes, cases).
 
     The eight effects are quadratic and cubic phase [rad/m], displacement east and north [m/m], and four parts of the
-    hidden phase. [rad/m]
+    hidden phase [rad/m], which `declared.Declared` defines.
     """
     return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
 
@@ -58,7 +59,7 @@ def effect_weights(exact: ExactRanges) -> Floats:
 def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
     """Effects of independent range errors, each a known variation over the aperture times a random size.
 
-    `weights` is the result of `effect_weights`. `courses` (errors, nodes, cases) are the range errors at 1 sigma. [m]
+    `weights` is the result of `effect_weights`. `courses` (errors, nodes, cases) [m] are the range errors at 1 sigma.
     """
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
@@ -76,7 +77,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     exact : ExactRanges
         Exact ranges at Gauss–Legendre nodes.
     weights : (8, nodes, cases)
-        The weights of `effect_weights`.
+        Result of `effect_weights`.
     covariance : (nodes, nodes, cases)
         Covariance of the range error between the nodes, in the Legendre orders that the nodes can distinguish. [m²]
     beyond : (cases,)
@@ -106,12 +107,13 @@ def effects_of_gauss_markov(
     exact, weights
         As for `effects_of_process`.
     courses : (errors, nodes, cases)
-        Range error per unit of each process. For a delay of the air it is the group delay, as a length. [m]
+        Range error per unit of each process. For an atmospheric delay it is the group delay, as a length. [m]
     ratio : (cases,)
         Half the aperture time divided by the correlation time.
     is_phase_advanced : bool
-        Whether the phase error has the opposite sign of the group delay, as for free electrons. The mean over the
-        aperture then has the sign of the group delay, and the deviation from the mean has the opposite sign.
+        Whether the phase error has the opposite sign of the group delay, as for free electrons. If so, the range
+        error in the image is the mean of the group delay over the aperture, minus the deviation of the group delay
+        from this mean.
     """
     ratios, ratio_index = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
     departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
@@ -161,7 +163,7 @@ def departure_at_nodes(count: int, ratios: Floats) -> Floats:
 def _lagged(count: int) -> tuple[Floats, Floats]:
     """Lags u from 0 to 2, (lags,), and weighted integrals of products of Legendre polynomials, (lags, count, count).
 
-    The lags are in units of half the aperture time. The integrals are ∫P_m(s)·P_n(s + u) ds, the sum for both signs
+    The lags are in units of half the aperture time. The integrals are ∫P_m(s)·P_n(s + u) ds, summed over both signs
     of the lag. They are multiplied by the quadrature weight of the lag. Each octave of lags has the same number of
     lags. The lags therefore become denser towards 0, and resolve correlation times of any length.
     """

@@ -11,7 +11,8 @@ constant and the second harmonic. A few values of ψ are therefore enough to fin
 vibrate in any phase, so their largest effects add.
 
 A vibration that the file states along the line of sight follows the turn of the line of sight, and all of it is range
-error. Derived here. Exact ranges in 36 phases check it (`tests/effects/test_slow_tones.py`).
+error. The method is derived here, not taken from a publication. `tests/effects/test_slow_tones.py` checks it against
+exact ranges in 36 phases.
 """
 
 import math
@@ -52,7 +53,7 @@ class TonePhases:
     """Phase errors due to a vibration along each axis, for values of its phase ψ all around the circle.
 
     Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
-    phase, and rms phase beyond the cubic. [rad]
+    phase (see `Declared`), and rms phase beyond the cubic. [rad]
     """
 
     quadratics: Floats
@@ -81,14 +82,14 @@ class TonePhases:
         return _worst(np.square(self.rests))
 
     def judged(self, gain: PerCase) -> Floats:
-        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad]
+        """Phase to compare with a limit that has been raised by the autofocus gain `gain`, (cases,). [rad]
 
-        The result (cases,) is the sum over the axes, each at the worst phase ψ of its vibration.
+        It is the sum over the axes, each at the worst phase ψ of its vibration. See `Declared.judged`.
         """
         return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
 
     def hidden(self, gain: PerCase) -> Floats:
-        """Hidden phase that, together with the worst quadratic phase, gives the phase `judged`, (cases,). [rad]
+        """Hidden phase that, together with the worst quadratic phase, gives the result of `judged`, (cases,). [rad]
 
         `gain` is the autofocus gain.
         """
@@ -174,7 +175,7 @@ class _Tone:
     def of_range(self, size: PerCase) -> Floats:
         """First-order effects of a sinusoidal range error of amplitude `size`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        The first axis has the order of the fields of `TonePhases`. `size` is a number or (nodes, cases). [m]
+        The first axis has the order of the fields of `TonePhases`. `size` [m] is a number or (nodes, cases).
         """
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
@@ -185,11 +186,11 @@ class _Tone:
         return np.array((quadratic, cubic, hidden, beyond_cubic))
 
     def of(self, way: Vectors, size: PerCase) -> Floats:
-        """Effects of a motion of amplitude `size` [m] along the direction `way`, (4, TONE_PHASE_COUNT, cases). [rad]
+        """Effects of a sinusoidal motion of a platform along the direction `way`, (4, TONE_PHASE_COUNT, cases). [rad]
 
-        The first axis has the order of the fields of `TonePhases`. Each component of `way` is (cases,) or (nodes,
-        cases). The effects are linear in `size`, except in cases where the second order matters. For these cases they
-        are computed from exact ranges.
+        `size` [m] is the amplitude of the motion. The first axis has the order of the fields of `TonePhases`. Each
+        component of `way` is (cases,) or (nodes, cases). The effects are linear in `size`, except in cases where the
+        second order matters. For these cases they are computed from exact ranges.
         """
         exact, cases = self.exact, self.exact.half.size
         small, size = (
@@ -213,7 +214,8 @@ class _Tone:
         """Effects from exact ranges for the cases with the indices `cases`, (4, TONE_PHASE_COUNT, len(cases)). [rad]
 
         `way` and `size` are as in `of`. If no ground point has the recorded range history for a phase ψ of the
-        vibration, each effect is set to the peak-to-peak phase of the motion, 2kA, with k = 2π/λ and the amplitude A.
+        vibration, each effect is set to the peak-to-peak phase of the motion, 2kA, where k = 2π/λ and A is the
+        amplitude.
         """
         case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(TONE_PHASES_RAD, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle

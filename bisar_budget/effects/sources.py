@@ -81,12 +81,12 @@ _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.p
 
 
 class _Flown(NamedTuple):
-    """Effect of one unit of a motion error, and the motions it causes, where at least one platform is in free fall.
+    """Effect of one unit of a motion error, and the motions it causes, if at least one platform is in free fall.
 
-    `full` is the effect per unit of a small error by the full model. `shifts` are the position errors of both
-    platforms at the nodes, three components (nodes, cases) each. [m/unit] `rates` are the velocities of these
-    position errors at mid-aperture. [m/s/unit] They are given for a position error in the frame `ric`; for any other
-    error `rates` is None.
+    `full` is the effect per unit of a small error in the full model. `shifts` [m/unit] are the position errors of
+    both platforms over the aperture, three components (nodes, cases) each. `rates` [m/s/unit] are the velocities of
+    these position errors at mid-aperture. They are given for a position error in the frame `ric`; for any other error
+    `rates` is None.
     """
 
     full: FullEffect
@@ -110,7 +110,7 @@ class ErrorListing:
     def listed(self) -> Iterator[ErrorSource]:
         """Yield the signed errors in a fixed order.
 
-        First are the errors of each platform's position, velocity and acceleration. Then follow the errors of the
+        The errors of each platform's position, velocity and acceleration come first. Then follow the errors of the
         clocks, the errors that both platforms share, and the errors of time tags. Last are the errors of registered
         kinds, the error of the terrain, and the quadratic phases that the file states directly.
         """
@@ -144,10 +144,10 @@ class ErrorListing:
         return [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
 
     def full_legs(self, platform_index: int, kind: StateKind) -> list[FullEffect]:
-        """Effects of a unit error of one platform along each of x, y and z by the full model.
+        """Effects of a unit error of one platform along each of x, y and z in the full model.
 
         `kind` is the kind of the error: position, velocity or acceleration. The motion errors are the polynomials of
-        (22). For a platform in free fall, `_flown` gives the effects.
+        equation (22). For a platform in free fall, `_flown` gives the effects.
         """
         if (platform_index, kind.order) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
@@ -160,7 +160,7 @@ class ErrorListing:
         """Motion of each platform in free fall due to unit errors of its state, (3, 3, 3, nodes, cases). [m/unit]
 
         The first three axes are the kind of the error (position, velocity, acceleration), its direction (x, y, z),
-        and the component of the motion. The item is None for a platform that is not in free fall.
+        and the component of the motion. The list has None for a platform that is not in free fall.
         """
         exact = self.exact
         return [
@@ -301,11 +301,11 @@ class ErrorListing:
         evidence: str | None = None,
         is_heard: bool = True,
     ) -> ErrorSource:
-        """Create a clock error whose unit is the time error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ with the coefficients `terms`.
+        """Create a clock error, one unit of which is the time error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³.
 
-        `value` is the declared size without the coverage factor; None if the file declares no size. `is_heard` tells
-        whether the data contain the error. If not, it has no effect in the full model. The published model always
-        includes it.
+        `terms` are the coefficients t̃₀ … t̃₃. `value` is the declared size without the coverage factor; None if the
+        file declares no size. `is_heard` tells whether the error appears in the radar data. If it does not, it has no
+        effect in the full model. The published model always includes it.
         """
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
@@ -347,7 +347,7 @@ class ErrorListing:
 
     @property
     def _delay_of_the_echo(self) -> tuple[PerCase, ...]:
-        """Delay of the echo after the direct path, as coefficients of a cubic polynomial in slow time. [s, s/s, …]
+        """Delay of the echo after the direct signal, as coefficients of a cubic polynomial in slow time. [s, s/s, …]
 
         A clock with a frequency error measures this delay with a proportional error.
         """
@@ -460,8 +460,8 @@ class ErrorListing:
         """Yield the errors of navigation time relative to radar time, for each platform and for both in common.
 
         With a time-tag error δt, the position is measured too late by δt. The position error is then p(τ + δt) −
-        p(τ), with the path p. For a small δt it is v(τ)·δt, with the velocity v. For a larger δt, exact ranges use
-        the path itself.
+        p(τ), where p is the path. For a small δt it is v(τ)·δt, where v is the velocity. For a larger δt, exact
+        ranges use the path itself.
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
@@ -506,10 +506,10 @@ class ErrorListing:
         )
 
     def _of_registered_kinds(self) -> Iterator[ErrorSource]:
-        """Yield the errors of kinds that packages register, with the effects of the motion that each kind defines.
+        """Yield the errors of registered kinds, with the effects of the motion that each kind defines.
 
-        The published model projects the motion on the line of sight at mid-aperture, and uses the Legendre orders of
-        the projection.
+        A registered kind is a kind of motion error that another package adds. The published model projects the motion
+        on the line of sight at mid-aperture, and uses the Legendre orders of the projection.
         """
         exact = self.exact
         for platform_index, name in enumerate(PLATFORMS):
@@ -539,12 +539,12 @@ class ErrorListing:
                 )
 
     def _resolved(self, kind: MotionKind, path: PlatformState) -> Floats:
-        """Motion due to one unit of a registered kind of error at the nodes, (3, nodes, cases). [m/unit]
+        """Motion over the aperture due to one unit of a registered kind of error, (3, nodes, cases). [m/unit]
 
         Raises
         ------
         MotionKindError
-            The motion cannot be used, or it changes so fast that the nodes do not resolve it.
+            The motion cannot be used, or it changes too fast for the nodes.
         """
         exact, places = self.exact, self.exact.sampling.places
         moved = np.array(kind.moved(path, exact.times))
@@ -605,9 +605,10 @@ class ErrorListing:
 
 @cache
 def _scene_axes(name: str, kind: StateKind) -> tuple[tuple[Subject, KeyPath, str, Note], ...]:
-    """Subject, key path, equation and no-limit note of the rows for errors along the axes x, y and z of the scene.
+    """Constant properties of the rows for errors of one platform and kind along the scene axes x, y and z.
 
-    The errors are errors of one platform and one kind. The note gives the reason why the row may have no limit.
+    Returns, for each axis, the subject, the key path, the name of the equation, and a note on why an error along this
+    axis may have no limit.
     """
     return tuple(
         (
@@ -627,8 +628,8 @@ def _along_scene_axis(
 
     `declared` are the three errors. `axes` are unit vectors of the frame in scene coordinates, and `axis` is the
     index of the scene axis. The three errors are independent: the squares of one-sigma values add, and the magnitudes
-    of bounds add. In a plain rotation of the signed values they could cancel. The rotation determines only the sign
-    of the result.
+    of bounds add. If the signed values were only rotated, they could cancel. The rotation therefore determines only
+    the sign of the result.
     """
     a, b, c = (value * direction[axis] for value, direction in zip(declared, axes, strict=True))
     size = np.sqrt(a * a + b * b + c * c) if distribution == "normal" else np.abs(a) + np.abs(b) + np.abs(c)
@@ -675,7 +676,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 def _total(terms: Sequence[PerCase]) -> PerCase:
     """Sum of terms; 0 if the terms cancel except for rounding errors.
 
-    A sum that is only rounding error would give a limit where none exists.
+    A sum that is only rounding error would lead to a limit that does not exist.
     """
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
@@ -694,7 +695,7 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: StateKind, axis: str) -> Note:
-    """Note on why an error of one kind along one axis may have no QPE limit.
+    """Note that explains why an error of one kind along one axis may have no limit due to the quadratic phase error.
 
     `axis` is the name of the axis in the note.
     """

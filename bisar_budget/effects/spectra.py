@@ -1,8 +1,9 @@
-"""Legendre parts of phase noise over an aperture, computed from spectra that consist of power-law pieces.
+"""Legendre components of phase noise over an aperture, computed from spectra that consist of power-law pieces.
 
-The parts are a constant, linear, quadratic and cubic part, and the phase beyond the cubic. Their mean squares are
-integrals of the spectrum, weighted with the squared parts of a tone. Spectra are one-sided, for phase at the radar's
-centre frequency. [rad²/Hz] The L(f) of a data sheet is half of such a spectrum.
+The components, or parts, are the constant, linear, quadratic and cubic component, and the phase beyond the cubic.
+Their mean squares are integrals of the spectrum, weighted by the squared Legendre components of a tone. Spectra
+[rad²/Hz] are one-sided, for phase at the radar's centre frequency. The L(f) of a data sheet is half of such a
+spectrum.
 
 The integrals use the angle x = πfT in place of the frequency f. The edges of the integration panels are then the same
 for every aperture time T, and so is the integral of a power law between two edges. Only the ends of a piece are
@@ -26,7 +27,7 @@ SERIES_ANGLE_RAD = 0.5  # angle or ratio; below it, terms cancel, and a series i
 
 
 class Parts(NamedTuple):
-    """Mean squares and mean products of the Legendre parts of a phase over the aperture. [rad²]
+    """Mean squares and mean products of the Legendre components of a phase over the aperture. [rad²]
 
     `quadratic` and `cubic` are the mean squares of the quadratic and the cubic part at the aperture edge. `left` is
     the mean square of the phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and
@@ -74,21 +75,21 @@ class Parts(NamedTuple):
 
     @property
     def of_high_orders(self) -> "Parts":
-        """Copy of the parts with the constant part, the linear part and their mean products set to 0."""
+        """Copy in which the constant part, the linear part and their mean products are 0."""
         nothing = 0.0 * self.quadratic
         return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
 
     def without_constant(self) -> "Parts":
-        """Copy of the parts with the constant part set to 0.
+        """Copy in which the constant part and its mean product with the quadratic part are 0.
 
-        It is used where a constant phase does not displace the image.
+        It is used if a constant phase does not displace the image.
         """
         nothing = 0.0 * self.quadratic
         return self._replace(constant=nothing, constant_quadratic=nothing)
 
 
 def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
-    """Mean squares of the Legendre parts of a Gauss–Markov process with variance 1 and correlation exp(−|t|/τ_c).
+    """Mean squares of the Legendre components of a Gauss–Markov process of variance 1 and correlation exp(−|t|/τ_c).
 
     The process is stationary. `aperture_time` and `correlation_time` τ_c are in s.
     """
@@ -100,9 +101,9 @@ def gauss_markov(aperture_time: PerCase, correlation_time: PerCase) -> Parts:
 
 
 def tone(angle: PerCase) -> Floats:
-    """Largest Legendre parts of a tone of amplitude 1 over the aperture, each at the tone's worst phase, (5, ...).
+    """Largest Legendre components of a tone of amplitude 1 over the aperture, each at its worst phase, (5, ...).
 
-    `angle` is πfT. [rad] The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
+    `angle` [rad] is πfT. The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
     constant part, and linear part. The four parts are amplitudes at the aperture edge.
     """
     angle = np.asarray(angle)
@@ -115,7 +116,7 @@ def tone(angle: PerCase) -> Floats:
 def held(step: PerCase) -> PerCase:
     """Spectrum of independent samples joined by straight lines, relative to its value at 0 Hz: sinc⁴.
 
-    `step` is 2π times frequency times sampling interval. [rad]
+    `step` [rad] is 2π times frequency times sampling interval.
     """
     return np.sinc(step / (2 * math.pi)) ** 4
 
@@ -158,7 +159,7 @@ _EDGES = np.array(_tone_edges(1 / math.pi))  # edges as angles πfT
 
 
 class PowerLawPiece(NamedTuple):
-    """Piece of a spectrum: the power law density·f^(−slope) [rad²/Hz] from the frequency `low` to `high`. [Hz]"""
+    """Piece of a spectrum: the power law density·f^(−slope) [rad²/Hz] from the frequency `low` to `high` [Hz]."""
 
     low: float
     high: float
@@ -190,9 +191,10 @@ def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCase = 0.0) -> Parts:
-    """Mean squares and products of the Legendre parts of a phase over the aperture, from its spectrum.
+    """Mean squares and mean products of the Legendre components of a phase over the aperture, from its spectrum.
 
-    They are integrals of the spectrum, weighted with the squared parts of a tone. The result is accurate to 1e-4.
+    They are integrals of the spectrum, weighted by the squared Legendre components of a tone. `Parts` lists the
+    components, and the pairs of components whose mean products are returned. The result is accurate to 1e-4.
 
     Parameters
     ----------
@@ -213,10 +215,11 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, above: PerCas
 
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
-    """Mean squares of the Legendre parts of the phase that remains after synchronization, (cases,) each.
+    """Mean squares of the Legendre components of the phase that remains after synchronization, (cases,) each.
 
-    `pieces` are the pieces of the phase spectrum before synchronization. `aperture_time` is (cases,). [s] `interval`
-    is the interval of the exchanged pulses [s]; None if pulses are not exchanged, so that all of the phase remains.
+    `pieces` are the pieces of the phase spectrum before synchronization. `aperture_time` [s] has the shape (cases,).
+    `interval` [s] is the interval of the exchanged pulses; it is None if pulses are not exchanged, so that all of the
+    phase remains.
     """
     times, time_index = np.unique(aperture_time, return_inverse=True)
     parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
@@ -229,10 +232,10 @@ def _like(total: Floats, aperture_time: PerCase) -> Parts:
 
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a tone, (parts, cases).
 
-    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
-    the order of `squares`.
+    The angle x [rad] is πfT, where f is the frequency and T the aperture time. `low` and `high` (cases,) are the
+    limits of the integrals in x. The first axis has the components in the order of `squares`.
     """
     first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
     last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
@@ -246,20 +249,22 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, up to each edge, (parts, edges).
+    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a tone, to each panel edge.
 
-    The integrals begin at the first panel edge. The first axis (parts) is in the order of `squares`.
+    The angle x [rad] is πfT, where f is the frequency and T the aperture time. The integrals begin at the first edge
+    of the panels. The result is (parts, edges), with the components in the order of `squares`.
     """
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
     return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, in one panel, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a tone, within one panel.
 
-    The function is used at the ends of a spectrum, which cover a panel only partly. `low` and `high` (cases,) are the
-    limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in the order of `squares`. Low and
-    high frequencies are integrated by formulas of their own. The result is 0 if `low` equals `high`.
+    The function is used at the ends of a spectrum, which cover a panel only partly. The angle x [rad] is πfT, where f
+    is the frequency and T the aperture time. `low` and `high` (cases,) are the limits of the integrals in x. The
+    result is (parts, cases), with the components in the order of `squares`. Low and high frequencies are integrated
+    by formulas of their own. The result is 0 if `low` equals `high`.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -276,38 +281,41 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
-    """Integral of x^exponent between two angles; infinite if it starts at zero and does not converge."""
+    """Integral of x^exponent between two angles; infinite if the lower angle is zero and the integral diverges."""
     power = exponent + 1
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(high / low) if abs(power) < 1e-9 else (high**power - low**power) / power)
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of slow tones, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a slow tone, (parts, cases).
 
-    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
-    the order of `squares`. The quadratic and cubic part, the power beyond the cubic, the constant and the linear part
-    of a tone are replaced by their leading powers x²/2, x³/6, x⁸/99225, 1 and x.
+    The angle x [rad] is πfT, where f is the frequency and T the aperture time. `low` and `high` (cases,) are the
+    limits of the integrals in x. The first axis has the components in the order of `squares`. The quadratic and cubic
+    component, the power beyond the cubic, the constant and the linear component of a tone are replaced by their
+    leading powers x²/2, x³/6, x⁸/99225, 1 and x.
     """
     powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of fast tones, (parts, cases).
+    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a fast tone, (parts, cases).
 
-    `low` and `high` (cases,) are the limits of the integrals, as angles x = πfT. [rad] The first axis (parts) is in
-    the order of `squares`. Terms that oscillate with the angle x are averaged.
+    The angle x [rad] is πfT, where f is the frequency and T the aperture time. `low` and `high` (cases,) are the
+    limits of the integrals in x. The first axis has the components in the order of `squares`. Terms that oscillate
+    with x are averaged.
     """
     (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
     return np.array(means)
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted with the squared parts of a tone, over n panels, (parts, n).
+    """Integrals of a spectrum x^(−slope), weighted by a tone's squared Legendre components over n panels, (parts, n).
 
-    The first axis (parts) is in the order of `squares`. The integrals are computed by Gauss–Legendre quadrature.
-    `low` and `high` (n,) are the ends of the panels, as angles x = πfT. [rad]
+    The integrals are computed by Gauss–Legendre quadrature. The angle x [rad] is πfT, where f is the frequency and T
+    the aperture time. `low` and `high` (n,) are the ends of the panels in x. The first axis has the components in the
+    order of `squares`.
     """
     span = np.log(high / low)
     x = low * np.exp(span * _LEGENDRE_NODES)
@@ -316,11 +324,11 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def squares(angle: Floats) -> Floats:
-    """Squares and products of the Legendre parts of a tone over the aperture, (7, …).
+    """Squares and products of the Legendre components of a tone over the aperture, (7, …).
 
     The rows are the squares of the quadratic and cubic part, the power beyond the cubic, the squares of the constant
     and linear part, the product of the constant and quadratic part, and the product of the linear and cubic part.
-    `angle` is πfT. [rad] All values are mean values for a tone of power 1 and random phase. They are also the values
+    `angle` [rad] is πfT. All values are mean values for a tone of power 1 and random phase. They are also the values
     for a tone of amplitude 1 if each part has its worst phase. The part of order n is shifted in phase by n quarter
     cycles, so parts whose orders differ by two have opposite signs.
     """
@@ -339,22 +347,23 @@ _GRID_AGES_CYCLES = np.concatenate(
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
-    """Mean squares and products of the Legendre parts of the phase of a clock that was set before the aperture.
+    """Mean squares and mean products of the Legendre components of the phase of a clock set before the aperture.
 
-    The parts are computed from the spectrum of the phase, (cases,) each. Setting the clock subtracts a line that is
+    The parts, (cases,) each, are computed from the spectrum of the phase. Setting the clock subtracts a line that is
     fitted to the clock's phase over the averaging time, at an age H before mid-aperture. With x = πfT, y = πft_c and
     θ = 2πfH, the constant part of a tone is then A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)], and its linear part
     at the aperture edge is A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y). The higher orders are equal to the orders
-    for a clock that was never set. Derived here. The result is bounded for spectra up to a slope of f⁻⁴. Above 24
-    cycles within the age, the phases during setting and aperture are treated as uncorrelated.
+    for a clock that was never set. These relations are derived here, not taken from a publication. The result is
+    bounded for spectra up to a slope of f⁻⁴. For tones with more than 24 cycles within the age, the phases during the
+    setting and during the aperture are treated as uncorrelated.
 
     Parameters
     ----------
     pieces : sequence of PowerLawPiece
         Pieces of a one-sided spectrum. [rad²/Hz]
     aperture_time, age, averaging : (cases,)
-        Aperture time T, age H, and averaging time t_c. The age runs from the middle of the averaging to mid-aperture,
-        and is at least (t_c + T)/2. [s]
+        Aperture time T, age H, and averaging time t_c [s]. The age runs from the middle of the averaging to
+        mid-aperture, and is at least (t_c + T)/2.
     """
     beyond = _RESOLVED_AGE_CYCLES / age
     times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
@@ -414,7 +423,7 @@ _FOLLOWED_DELAY_CYCLES = 12  # cycles of a tone within the delay up to which pan
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: PerCase) -> Parts:
-    """Mean squares and products of the Legendre parts of the change of a clock's phase over a delay.
+    """Mean squares and mean products of the Legendre components of the change of a clock's phase over a delay.
 
     They are integrals of the spectrum S·4 sin²(πfΔt) of the change, where S is the spectrum of the phase itself.
 
@@ -444,14 +453,18 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, delay: 
 
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, interval: float) -> Parts:
-    """Mean squares and products of the Legendre parts of the phase that remains after an exchange of pulses.
+    """Mean squares and mean products of the Legendre components of a phase after synchronization by exchanged pulses.
 
-    They are integrals of the spectrum of the remaining phase. The exchanged pulses sample the phase at an `interval`
-    T_s. [s] The remaining phase is the phase minus the straight lines that join its samples. For a tone at the
-    frequency f, these lines contain sinc²(f·T_s) of its amplitude. They also fold every tone at f + m/T_s onto f. A
-    spectrum S therefore becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines may begin at any instant
-    within the interval. Pieces may be narrow or steep, and may begin and end anywhere. The result is accurate to
-    1e-4, except for tones of more than 24 cycles within the aperture, whose parts are averaged over their cycles.
+    They are integrals of the spectrum of the phase that remains after synchronization. `Parts` lists the components,
+    and the pairs of components whose mean products are returned. The exchanged pulses sample the phase at intervals
+    T_s = `interval` [s]. The remaining phase is the phase minus the linear interpolation of its samples. The
+    interpolation reproduces a tone of frequency f with the gain sinc²(f·T_s), and aliases every tone at f + m/T_s to
+    f. A spectrum S therefore becomes S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. This is the mean over all
+    positions of the first sample within an interval.
+
+    The pieces of the spectrum may be narrow or steep, with arbitrary limits. The result is accurate to 1e-4, except
+    for tones of more than 24 cycles per aperture. For such tones, the squared components are replaced by their
+    averages over a cycle.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
@@ -467,10 +480,10 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Mean squares of the Legendre parts of a phase that joins independent samples of variance 1 by straight lines.
+    """Mean squares of the Legendre components of a phase, interpolated linearly between independent samples.
 
-    `interval` is the time T_s between the samples. [s] The one-sided spectrum of the phase is 2·T_s·sinc⁴(f·T_s). Its
-    total power is ⅔.
+    `interval` [s] is the time T_s between the samples. The samples have variance 1. The one-sided spectrum of the
+    phase is 2·T_s·sinc⁴(f·T_s). Its total power is ⅔.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
@@ -487,10 +500,13 @@ def _over_panels(
     high: Floats,
     scale: Floats,
 ) -> Floats:
-    """Integrals of a spectrum, weighted with the squared parts of a tone, over panels from 0 Hz up, (parts, cases).
+    """Integrals of a spectrum, weighted by the squared Legendre components of a tone, from 0 Hz to `high`.
 
-    `density` is the spectrum, a function of frequencies and of the indices of their cases. `edges` are the edges of
-    the panels of each case, and `high` (cases,) is the end of the last panel. [Hz] `scale` (cases,) is πT. [s]
+    The result is (parts, cases), with the components in the order of `squares`.
+
+    `density` is the spectrum, a function of frequencies and of the indices of their cases. The integrals are computed
+    panel by panel. `edges` are the edges of the panels of each case, and `high` (cases,) [Hz] is the end of the last
+    panel. `scale` (cases,) [s] is πT, where T is the aperture time.
     """
     panels = [
         (low, top, case)
@@ -509,9 +525,10 @@ def _over_panels(
 
 
 def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
-    """Add to `total` the Legendre parts due to a spectrum above the frequencies `last` [Hz], multiplied by `times`.
+    """Add to `total` the integrals of a spectrum above the frequencies `last` [Hz], multiplied by `times`.
 
-    `total` is (parts, cases), with the parts in the order of `squares`. `scale` is πT. [s] Terms that oscillate with
+    The integrals are weighted by the squared Legendre components of a tone. `total` is (parts, cases), with the
+    components in the order of `squares`. `scale` [s] is πT, where T is the aperture time. Terms that oscillate with
     the angle πfT are averaged.
     """
     for piece in pieces:
@@ -522,11 +539,11 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
-    """Integrals of a spectrum, weighted with the squared parts of a tone, over n frequency panels, (parts, n).
+    """Integrals of a spectrum, weighted by a tone's squared Legendre components, over n frequency panels, (parts, n).
 
-    The first axis (parts) is in the order of `squares`. The integrals are computed by Gauss–Legendre quadrature.
-    `density` is the spectrum as a function of frequency. `low` and `high` (n,) are the ends of the panels. [Hz]
-    `scale` (n,) is πT. [s]
+    The first axis has the components in the order of `squares`. The integrals are computed by Gauss–Legendre
+    quadrature. `density` is the spectrum as a function of frequency. `low` and `high` (n,) [Hz] are the ends of the
+    panels. `scale` (n,) [s] is πT, where T is the aperture time.
     """
     is_first = low == 0
     span = np.log(high / np.where(is_first, high, low))
@@ -541,10 +558,10 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
 
 
 def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
-    """Spectrum that remains after synchronization, at frequencies `f` (nodes, n). [rad²/Hz]
+    """Spectrum of the phase that remains after synchronization, at the frequencies `f` [Hz]. [rad²/Hz]
 
-    `f` are the frequencies of the nodes of n panels. [Hz] `rate` is the rate at which synchronization samples the
-    phase. [Hz]
+    `f` (nodes, n) are the frequencies of the quadrature nodes of n panels. `rate` [Hz] is the rate at which
+    synchronization samples the phase.
     """
     _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
     f = f[:, once]
@@ -562,7 +579,7 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
 def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
     """Sum of the densities of a piece at the frequencies m·rate ± start, for m = 1, 2 … [rad²/Hz]
 
-    `start` is at most half the sampling rate. [Hz] Aliases near 0 Hz, where the power law changes strongly within one
+    `start` [Hz] is at most half the sampling rate. Aliases near 0 Hz, where the power law changes strongly within one
     sampling rate, are added one by one. The Euler–Maclaurin formula gives the sum of the remaining aliases.
     """
     far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
@@ -621,9 +638,9 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Edges of the frequency panels for a synchronized phase, or for the change of a phase over an interval. [Hz]
 
-    `aperture_time` is in s. `rate` is the inverse of the interval. [Hz] Within a panel, the parts of a tone are
-    smooth functions of frequency. The same holds for the fraction of the tone that the straight lines between samples
-    contain.
+    `aperture_time` is in seconds. `rate` [Hz] is the inverse of the interval. Within a panel, the parts of a tone are
+    smooth functions of frequency, and so is the fraction of the tone that linear interpolation between samples
+    reproduces.
     """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time
@@ -636,8 +653,8 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
 def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
     """Edges of frequency panels within which a spectrum and its images are smooth. [Hz]
 
-    An image is the part of a spectrum that synchronization folds to another frequency. `ends` are the ends of the
-    pieces of the spectrum. [Hz] `rate` is the sampling rate of the synchronization. [Hz]
+    An image is the part of a spectrum that synchronization folds to another frequency. `ends` [Hz] are the ends of
+    the pieces of the spectrum. `rate` [Hz] is the sampling rate of the synchronization.
     """
     starts = {abs(end - round(end / rate) * rate) for end in ends}
     images = [

@@ -1,4 +1,4 @@
-"""Declared vibrations: paired echoes, components along the line of sight, slow phases, and spectra.
+"""Declared vibrations: paired echoes, components along the line of sight, phases of slow vibrations, and spectra.
 
 If the receiver uses the direct path as its clock, the data contain ranges minus the length of the direct path. The
 effect of a vibration is then its effect on this difference.
@@ -12,9 +12,9 @@ A vibration of n > 1 cycles per aperture and peak phase φ makes echoes at n res
 echo has φ/2 times the amplitude of the response and the same shape. For a uniform aperture the shape is sinc(x) =
 sin(πx)/(πx), whose sidelobes reach the next echo. The phases of vibrations are unknown. In the worst case, several
 echoes add in phase at a position x. Their sum is Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum is
-used. Derived here. From three cycles per aperture on, this agrees within 0.5 dB with transforms of the phasor for the
-worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are left out. They would add up to 0.3 dB at three
-cycles, and less at more cycles.
+used. This method is derived here, not taken from a publication. From three cycles per aperture on, it agrees within
+0.5 dB with transforms of the phasor for the worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are
+left out. They would add up to 0.3 dB at three cycles, and less at more cycles.
 
 A spectrum S_a of acceleration corresponds to the spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase,
 cubic phase, spread and displacement are the integrals of `spectra`. Motion slower than the aperture is therefore
@@ -63,7 +63,7 @@ _STEEP_PIECE_COUNT = 16  # flat pieces in place of a steep piece, which is narro
 
 # ---------------------------------------------------------------------- echoes that add
 class Worst(NamedTuple):
-    """Highest echo that several tones make together in their worst phases.
+    """Highest paired echo that several tones make together in their worst phases.
 
     `amplitude` is the amplitude of a single tone with an equally high echo. `cycles` is the position of the highest
     echo, in resolution cells; a tone has its own echo at its number of cycles per aperture.
@@ -74,11 +74,11 @@ class Worst(NamedTuple):
 
 
 def near_groups(cycles: Floats) -> NDArray[np.intp]:
-    """Number of the group of each tone; neighbouring tones of a group are at most 2.5 cycles per aperture apart.
+    """Index of the group to which each tone belongs; neighbours in a group are at most 2.5 cycles per aperture apart.
 
     `cycles` are the cycles per aperture of the tones, (n, cases). The result has the same shape. A group has two or
     more tones. The groups of a case are numbered from 0 in order of frequency. A tone outside all groups, or below
-    one cycle per aperture, has the number -1.
+    one cycle per aperture, has the index -1.
     """
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
@@ -107,7 +107,7 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
 def worst_phases(
     amplitudes: Sequence[PerCase] | Floats, cycles: Sequence[PerCase] | Floats, is_member: Booleans | None = None
 ) -> Worst:
-    """Height and position of the highest echo that several tones make together in their worst phases.
+    """Height and position of the highest paired echo that several tones make together in their worst phases.
 
     Parameters
     ----------
@@ -187,7 +187,10 @@ def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
 
 
 def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
-    """Height and position of the highest echo, by a search in steps around each starting point, (cases,) each."""
+    """Height and position of the highest paired echo, (cases,) each.
+
+    They are found by a search in steps around each starting point.
+    """
     best = starts
     for step in _SEARCH_STEPS_CELLS:
         tried = best + step * _REACH
@@ -200,7 +203,10 @@ def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Float
 
 
 def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
-    """Sum of the heights of all echoes at the positions `x` (…, cases) in resolution cells, if they are in phase."""
+    """Sum of the heights of all paired echoes at the positions `x` (…, cases), if they are in phase.
+
+    Positions are in resolution cells.
+    """
     return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
@@ -220,8 +226,8 @@ class Line(NamedTuple):
 def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = None) -> Vectors:
     """Reduction of the range per metre of a platform's motion along each scene axis, at mid-aperture. [m/m]
 
-    With a direct path, it is the reduction of the range minus the direct path. By default, `geometry` is the
-    mission's own geometry.
+    With a direct path, it is the reduction of the difference between the range and the direct path. By default,
+    `geometry` is the mission's own geometry.
     """
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
     return sights[PLATFORMS.index(name)]
@@ -230,12 +236,12 @@ def sight_of(mission: Mission, name: str, geometry: BistaticGeometry | None = No
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[PerCase]:
-    """Range error per metre of a platform's vibration along each of its axes, as rms over the aperture. [m/m]
+    """Range error per metre of a platform's vibration along each axis, as rms over the aperture. [m/m]
 
-    The line of sight turns over the aperture. The rms is an upper bound for the height of every echo, and gives the
-    spread. If `is_vector` is true, the axes are those of the frame of the platform's motion error. If it is false,
-    the file states a single value along the line of sight, and the result has a single item. Such a vibration is
-    entirely range error; with a direct path, however, only a part of it is an error of the range minus the direct
+    The line of sight turns over the aperture. The rms is an upper bound for the height of every paired echo, and
+    gives the spread. If `is_vector` is true, the axes are those of the frame of the platform's motion error. If it is
+    false, the file states a single value along the line of sight, and the result has a single item. Such a vibration
+    is entirely range error; with a direct path, however, only a part of it is an error of the range minus the direct
     path.
     """
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
@@ -265,8 +271,8 @@ def counted(
 ) -> PerCase:
     """Amplitude or rms of a platform's vibration along the line of sight. [m]
 
-    `metric` is `pslr` for an amplitude and `islr` for an rms. `value` is a single value along the line of sight, or
-    three values along the axes of the platform's frame. [m] The projections follow from `seen_of_axes`. Projected
+    `metric` is `pslr` for an amplitude and `islr` for an rms. `value` [m] is a single value along the line of sight,
+    or three values along the axes of the platform's frame. The projections follow from `seen_of_axes`. Projected
     amplitudes add, because the axes may vibrate in any phase. Rms values are independent, so their squares add.
     """
     sizes = value if isinstance(value, tuple) else (value,)
@@ -302,11 +308,11 @@ def unit_of_line(mission: Mission, name: str, entry: int) -> str:
 def projected(
     mission: Mission, value: float | Vector, error: MotionError, along: float, *, is_slow: bool = False
 ) -> tuple[Note, ...]:
-    """Note on the component of a vibration along the line of sight; empty if the vibration is stated along it.
+    """Note on the component of a vibration along the line of sight; empty if the file states only this component.
 
-    `value` is the stated amplitude or rms, and `along` is the component. [m] With a direct path there is a note for
-    every vibration, which gives the component in the range minus the direct path. For a slow vibration (`is_slow`)
-    the note gives the amplitude along the line of sight that would have the same effect.
+    `value` [m] is the stated amplitude or rms, and `along` [m] is the component. With a direct path there is a note
+    for every vibration, which gives the component in the range minus the direct path. For a slow vibration
+    (`is_slow`) the note gives the amplitude along the line of sight that would have the same effect.
     """
     says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
@@ -344,10 +350,11 @@ class DeclaredPhase(NamedTuple):
     """Quadratic and cubic phase due to one declared error, as used in sums. [rad]
 
     `cubic_rad` is None for a pure quadratic phase. `coverage` is the coverage factor that both phases include.
-    `is_there` marks the cases in which a vibration is slow; in all other cases its phases are 0. `hidden_rad` is the
-    hidden phase: the quadratic phase that lowers the peak as much as the range error that the displacement cannot
-    remove, mainly a constant and a linear part, see `ranges.exact_ranges`. [rad] It is added to the quadratic phase
-    as a root-sum-square.
+    `is_there` marks the cases in which a vibration is slow; in all other cases its phases are 0.
+
+    `hidden_rad` [rad] is the hidden phase, which is added to the quadratic phase as a root-sum-square. For any
+    displacement of the image, a part of the range error remains, mainly constant and linear in time. The hidden phase
+    is the quadratic phase that lowers the peak as much as this part does, see `ranges.exact_ranges`.
     """
 
     row_id: str
@@ -359,15 +366,19 @@ class DeclaredPhase(NamedTuple):
     hidden_rad: PerCase = 0.0
 
     def judged(self, gain: PerCase) -> PerCase:
-        """Phase for comparison with a limit raised by the autofocus gain `gain`, see `Declared.judged`. [rad]"""
+        """Phase to compare with a limit that has been raised by the autofocus gain; see `Declared.judged`. [rad]
+
+        `gain` is the autofocus gain.
+        """
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
-    """Yield, for each vibration below one cycle per aperture, its subject and the motion of its platform. [m]
+    """Yield, for each vibration below one cycle per aperture, its subject and the motion of its platform [m].
 
-    Along each axis the motion has a cosine and a sine component. It is 0 in cases in which the vibration is faster. A
-    vibration stated along the line of sight moves its platform along the line of sight to the scene centre.
+    Along each axis the motion has a cosine and a sine component. It is 0 in the cases in which the vibration has one
+    cycle or more. A vibration stated along the line of sight moves its platform along the line of sight to the scene
+    centre.
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
@@ -387,7 +398,7 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
 
 # ---------------------------------------------------------------------- by a spectrum
 def power_of(vibration: Vibration | FeltVibration) -> PerCase:
-    """Factor 10^(L/10) that scales a vibration's spectrum by its `spectrum_level` L in dB; 1 without a level."""
+    """Factor 10^(L/10) by which the `spectrum_level` L [dB] of a vibration scales its spectrum; 1 without a level."""
     return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
 
@@ -395,7 +406,7 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
     """Convert a vibration spectrum, multiplied by a power law of frequency, to power-law pieces.
 
     `law` is the pair (factor, slope) of the power law factor·f^(−slope), which multiplies the spectrum of
-    acceleration. [(m/s²)²/Hz] A spectrum of displacement is first converted to a spectrum of acceleration, which is
+    acceleration [(m/s²)²/Hz]. A spectrum of displacement is first converted to a spectrum of acceleration, which is
     (2πf)⁴ times as large. The spectrum must consist of plain numbers.
     """
     factor, slope = law
@@ -417,7 +428,7 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
 
 
 def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) -> float:
-    """Mean density of a power law f^(−slope) from the frequency `low` to `high`. [Hz]
+    """Mean density of a power law f^(−slope) between the frequencies `low` and `high` [Hz].
 
     `at_low` and `at_high` are the densities at both ends.
     """
@@ -450,10 +461,11 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the random error of a vibration that the file states by a spectrum; nothing without a spectrum.
+    """Yield the random error of a vibration that the file states by a spectrum; yield nothing without a spectrum.
 
-    `name` is the name of the vibrating platform. As for noise of an oscillator, the unit is dB, and the declared size
-    is an amplitude factor of 1.
+    `name` is the name of the vibrating platform. The size of the error is the factor by which the amplitude of the
+    vibration is multiplied; the declared size is 1. The unit is `dB`, because the row of the error has the factor in
+    decibels, as for the noise of an oscillator.
     """
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:

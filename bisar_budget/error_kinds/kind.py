@@ -79,7 +79,7 @@ class ErrorKind:
     owes_source: bool = False
 
     def row_id(self, owner: str, axis: str = "", entry: int | None = None) -> str:
-        """Id of the row of an error of this kind, in the form that the contract defines."""
+        """Id of the row of an error of this kind, in the form of `id_form` or `common_id_form`."""
         form = self.common_id_form if self.common_id_form and owner == "mission" else self.id_form
         names = {
             "owner": _OWNER_WORDS.get(owner, owner),
@@ -91,11 +91,11 @@ class ErrorKind:
 
     @property
     def has_numbers(self) -> bool:
-        """Whether a row id contains the index of the error in a list of the file."""
+        """Whether the row ids of the kind contain the index of the error in a list of the mission file."""
         return "{entry}" in self.id_form
 
     def find_in(self, table: Mapping[str, _Entry], axis: str = "") -> _Entry:
-        """Entry of a table by kind: the entry `KIND.AXIS` if the table has one, else the entry `KIND`.
+        """Look up this kind in a table: the entry `KIND.AXIS` if the table has one, otherwise the entry `KIND`.
 
         Raises `KeyError` if the table has neither.
         """
@@ -236,10 +236,10 @@ class SourceKind(ErrorKind):
 
     @property
     def is_shared(self) -> bool:
-        """Whether the paths of both platforms can share the error."""
+        """Whether the paths of both platforms can share an error of this kind."""
         return self.moves == "platform" and bool(self.common_id_form)
 
     @property
     def has_covariance(self) -> bool:
-        """Whether the file can state this error by a covariance."""
+        """Whether a mission file can state an error of this kind by a covariance."""
         return False

@@ -71,7 +71,10 @@ class StateKind(PathKind):
 
     @property
     def has_covariance(self) -> bool:
-        """Whether the file can state this error by a covariance, which is so for position and velocity errors."""
+        """Whether a mission file can state an error of this kind by a covariance.
+
+        This is the case for position and velocity errors.
+        """
         return self.order < 2
 
     def course(self, times: "Floats") -> "Floats":

@@ -57,7 +57,7 @@ class InertialFigure(ErrorSize):
 
     @property
     def growth_power(self) -> int:
-        """Exponent of the aperture time to which the covariance of the position error is proportional."""
+        """Exponent n of the aperture time T: the covariance of the position error grows as Tⁿ."""
         return 2 * self.integrals - self.spreads
 
 

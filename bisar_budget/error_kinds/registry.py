@@ -63,21 +63,21 @@ class MotionKind(PathKind):
     dimension : units.Dimension
         Dimension of the size, one of `bisar_budget.units`.
     description : str
-        What the error is, in one sentence; for messages, the JSON Schema and the explanation.
+        Description of the error in one sentence, used in messages, in the JSON Schema and in explanations.
     motion : callable
-        Function `motion(path, times)` that returns the measured minus the true position of the antenna's phase centre
-        for an error of one unit: east, north and up, (3, ...) for times (...). [m/unit] `path` is the true path, a
-        `PlatformState`; `path.place(times)` are its positions relative to the scene centre. [m] `times` are slow
-        times from mid-aperture. [s] The motion error must be proportional to the size of the error, and smooth: a
-        motion that the nodes of the aperture do not resolve, such as a vibration, is refused.
+        Function `motion(path, times)` that returns the measured minus the true position [m/unit] of the antenna's
+        phase centre for an error of one unit: east, north and up, (3, ...) for times (...). `path` is the true path,
+        a `PlatformState`; `path.place(times)` [m] are its positions relative to the scene centre. `times` [s] are
+        slow times from mid-aperture. The motion error must be proportional to the size of the error, and smooth. A
+        motion that changes too fast for the nodes over the aperture, such as a vibration, is refused.
     equation : str
-        Source of the motion, such as an equation of a paper; for reports.
+        Source of the motion, such as an equation of a paper; it is shown in reports.
 
     Raises
     ------
     ValueError
-        The name does not begin with a lower-case letter, or has characters other than those, digits and underscores,
-        or it is a word that has another meaning in row ids, such as `receiver` or `covariance`.
+        The name does not begin with a lower-case letter, has characters other than lower-case letters, digits and
+        underscores, or has another meaning in row ids, such as `receiver` or `covariance`.
     """
 
     dimension: units.Dimension
@@ -87,7 +87,7 @@ class MotionKind(PathKind):
     def __init__(
         self, *, name: str, dimension: units.Dimension, description: str, motion: Motion, equation: str = "full model"
     ) -> None:
-        """Make a kind of error of a platform. All other attributes of `SourceKind` follow from the motion."""
+        """Create a kind of error of a platform. All other attributes of `SourceKind` follow from the motion."""
         if not re.fullmatch("[a-z][a-z0-9_]*", name):
             raise ValueError(f"{name!r} is no name of a kind; accepted: small letters, digits, underscores")
         if name in _TAKEN_NAMES:
@@ -133,7 +133,7 @@ class MotionKind(PathKind):
 
     @property
     def origin(self) -> str:
-        """Words for the kind, with the distribution that provides it, if an entry point does."""
+        """Description of the kind for messages, with the distribution whose entry point provides it, if any."""
         distribution = _DISTRIBUTIONS.get(self.name)
         return f"registered kind {self.name}" + (f" of the distribution {distribution}" if distribution else "")
 
@@ -154,9 +154,9 @@ def register(kind: MotionKind) -> None:
     Raises
     ------
     TypeError
-        The object is not a `MotionKind`; only the motion describes a kind completely.
+        The object is not a `MotionKind`; only kinds that are described completely by a motion can be registered.
     ValueError
-        Another kind with the same name is registered.
+        Another kind with the same name is already registered.
     """
     if not isinstance(kind, MotionKind):
         raise TypeError(f"{kind!r} is no bisar_budget.MotionKind")
@@ -205,8 +205,8 @@ for _kind in (
 def _read_entry_points() -> None:
     """Register the kinds of error that installed packages provide as entry points; done once.
 
-    An entry point that gives no kind becomes a fault, and does not end commands that do not need its kind. If two
-    distributions provide kinds with the same name, none of them is registered.
+    An entry point that does not provide a kind is recorded as a fault, and does not stop commands that do not need
+    its kind. If two distributions provide kinds with the same name, neither kind is registered.
     """
     from importlib.metadata import entry_points
 
@@ -238,7 +238,7 @@ def _read_entry_points() -> None:
 
 
 def entry_point_faults() -> tuple[str, ...]:
-    """Sentences about entry points of installed packages that give no kind of error."""
+    """Messages about entry points of installed packages that do not provide a valid kind of error."""
     _read_entry_points()
     return tuple(_ENTRY_POINT_FAULTS)
 
@@ -249,7 +249,7 @@ def kind_of(name: str) -> ErrorKind:
     Raises
     ------
     KeyError
-        No kind has the name, in this package or in an installed one.
+        There is no kind with this name, either in this package or in an installed package.
     """
     if name not in _KINDS:
         _read_entry_points()
@@ -262,12 +262,12 @@ def kinds() -> tuple[ErrorKind, ...]:
 
 
 def names_of_named_kinds() -> frozenset[str]:
-    """Names of the kinds of which a file may state several errors, each with a name of its own."""
+    """Names of the kinds that allow several errors in a file, each with a name of its own."""
     return frozenset(kind.name for kind in kinds() if isinstance(kind, SourceKind) and kind.has_names)
 
 
 def motion_kind(name: object) -> MotionKind | None:
-    """Return the kind of error that a package registered under the given name; None if there is none."""
+    """Return the kind of error that a package registered under the given name; None if there is no such kind."""
     if name not in _KINDS:
         _read_entry_points()
     kind = _KINDS.get(name) if isinstance(name, str) else None

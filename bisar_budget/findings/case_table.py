@@ -20,7 +20,8 @@ class Cases:
     """Cases of a sweep: the varied keys, and for each key a column of values.
 
     Values are numbers in SI, or strings. The cases of a grid are all combinations of the values of the columns, and
-    the last key varies fastest. Without a grid all columns have the same length, and each case takes one row of them.
+    the last key varies fastest. Without a grid all columns have the same length, and each case consists of one value
+    from each column.
     """
 
     varied: tuple[Varied, ...]
@@ -29,7 +30,7 @@ class Cases:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the array of cases: for a grid the number of values of each key, otherwise the number of cases."""
+        """Shape of the array of cases: the number of values of each key for a grid, otherwise the number of cases."""
         return tuple(column.size for column in (self.columns if self.is_grid else self.columns[:1]))
 
     @property
@@ -38,7 +39,7 @@ class Cases:
         return math.prod(self.shape)
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Values of the cases `start` to `stop` - 1, as arrays (stop - start,) by key."""
+        """Values of the cases `start` to `stop` - 1, as an array (stop - start,) for each key."""
         indices: Sequence[slice | NDArray[np.intp]] = [slice(start, stop)] * len(self.columns)
         if self.is_grid:
             indices = np.unravel_index(np.arange(start, stop), self.shape)
@@ -76,7 +77,7 @@ class Column(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """Name and unit, for tables and axes."""
+        """Name and unit of the column, as a heading for tables and axes."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 

@@ -1,7 +1,7 @@
 """Results of forming images, as frozen data: verdicts on the limits of rows, and pictures of the images.
 
-The field names of verdicts are those of the JSON contract of `verify`. Pictures have the axes of the rotated image:
-x′ is along the bistatic look direction φ_b, and y′ is across it, counter-clockwise.
+The fields of verdicts have the names that are used in the JSON output of `verify`. Pictures have the axes of the
+rotated image: x′ is along the bistatic look direction φ_b, and y′ is across it, counter-clockwise.
 """
 
 from typing import NamedTuple
@@ -16,16 +16,16 @@ CHIP_FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
-    """Verdict of the image on the limit of one row; values that do not exist are None.
+    """Verdict of the image on the limit of one row; values that are not available are None.
 
     Phases are magnitudes at the aperture edge [rad]: `published_…` follow from Table II of Rigling & Moses, `full_…`
     from the closed form of the full model, and `predicted_…` from exact ranges; `measured_…` are measured in the
     image. `…_inside` and `…_beyond` are measured at 0.9 and 1.1 times the limit. Displacements are on the ground
-    (east, north) [m]: `displacement_m` follows from exact ranges, `…_published_m` from (25) of Rigling & Moses, and
-    `…_full_m` from the full model. The smear azimuth is the direction of a line, from 0 to π; `…_published_rad`
-    follows from (31). For vibration and noise `measured_db` is compared with `requirement_db`; for noise it has a
-    standard error and a 95 % interval. With autofocus a second image is formed at the limit `boundary_autofocus`, and
-    refocused. `reason` and `reason_autofocus` explain the verdicts.
+    (east, north) [m]: `displacement_m` follows from exact ranges, `…_published_m` from equation (25) of Rigling &
+    Moses, and `…_full_m` from the full model. The smear azimuth is the direction of a line, from 0 to π;
+    `…_published_rad` follows from equation (31). For vibration and noise `measured_db` is compared with
+    `requirement_db`; for noise it has a standard error and a 95 % interval. With autofocus a second image is formed
+    at the limit `boundary_autofocus`, and refocused. `reason` and `reason_autofocus` explain the verdicts.
     """
 
     id: str
@@ -67,7 +67,7 @@ class Verdict(NamedTuple):
 
     @property
     def judged_phases_rad(self) -> tuple[float | None, float | None]:
-        """Phase that the budget limits: predicted from exact ranges, and measured in the image. [rad]
+        """Phase that the budget limits, as predicted from exact ranges and as measured in the image. [rad]
 
         It is the cubic phase if the row limits the cubic phase. Otherwise it is the quadratic phase that would cause
         the same loss of the peak.
@@ -80,10 +80,11 @@ class Verdict(NamedTuple):
 
     @property
     def of_equal_loss(self) -> str:
-        """Suffix ` of equal loss` for the name of the judged phase, or an empty string.
+        """Suffix for the name of the judged phase: ` of equal loss`, or an empty string.
 
-        The result is empty if at least 99 % of the judged phase is quadratic phase in the image, or if the row limits
-        the cubic phase.
+        The suffix says that the judged phase is the quadratic phase that would cause the same loss of the peak as the
+        actual phases. The result is empty if at least 99 % of the judged phase is quadratic phase in the image, or if
+        the row limits the cubic phase.
         """
         phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
         is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
@@ -93,8 +94,8 @@ class Verdict(NamedTuple):
 class VerifiedMission(NamedTuple):
     """Verdicts of images on the limits of one mission; `conditions` describes how the images were formed.
 
-    `changes` are values that options put in place of the file's values. `overrides` are all influences from outside
-    the file on the verdicts.
+    `changes` are values that options put in place of the file's values. `overrides` are all influences on the
+    verdicts that are not in the file.
     """
 
     file: str
@@ -108,8 +109,8 @@ class VerifiedMission(NamedTuple):
     def status(self) -> str:
         """Status of the verification: `fail`, `not_evaluated` or `pass`.
 
-        `fail` if a limit of the gating model is optimistic, with or without autofocus. `not_evaluated` if no limit
-        has a verdict, because then nothing was verified. Otherwise `pass`.
+        It is `fail` if a limit of the model that decides the verdict is optimistic, with or without autofocus. It is
+        `not_evaluated` if no limit has a verdict, because then nothing was verified. Otherwise it is `pass`.
         """
         verdicts = {row.verdict for row in self.rows} | {row.verdict_autofocus for row in self.rows}
         if "optimistic" in verdicts:
@@ -118,7 +119,7 @@ class VerifiedMission(NamedTuple):
 
     @property
     def doubt(self) -> Note:
-        """Note that no limit has a verdict; it is empty if at least one limit has a verdict."""
+        """Note stating that no limit has a verdict; it is empty if at least one limit has a verdict."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
         return phrases.note("nothing-verified", rows=len(self.rows))
@@ -145,7 +146,7 @@ class PointImage(NamedTuple):
 
     @property
     def extent_m(self) -> tuple[float, float]:
-        """Size of the chip along x′ and y′. [m]"""
+        """Size of the image chip along x′ and y′. [m]"""
         return (self.columns * self.pixel_m[0], self.rows * self.pixel_m[1])
 
 

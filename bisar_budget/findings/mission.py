@@ -81,11 +81,11 @@ class MissionFindings(NamedTuple):
     requirement_texts: Mapping[str, str] = {}  # texts of requirement ids, as the mission states them
 
     def __repr__(self) -> str:
-        """File, name and status, on one line."""
+        """Show the file, the name and the status of the mission on one line."""
         return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
 
     def texts_of(self, judged: JudgedRequirement | Row) -> list[str]:
-        """Requirement texts for the ids of a row or requirement; ids without a text are left out."""
+        """Texts of the requirements whose ids a row or requirement has; ids without a text are left out."""
         return [
             self.requirement_texts[own_id] for own_id in judged.requirement_ids if own_id in self.requirement_texts
         ]
@@ -121,9 +121,9 @@ class MissionFindings(NamedTuple):
     def statuses(self) -> frozenset[str]:
         """All statuses of the mission: of its rows, of its requirements, and of doubts about it.
 
-        `not_evaluated` is included if nothing was judged, or if images were required and none gave a verdict. `warn`
-        is included if a warning questions the checked mission. A strict run needs all statuses, because a waived
-        mission may also have a warning.
+        `not_evaluated` is included if nothing was judged, or if images were required and no image gave a verdict.
+        `warn` is included if a warning questions the checked mission. A strict run needs all statuses, because a
+        waived mission may also have a warning.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
@@ -137,7 +137,7 @@ class MissionFindings(NamedTuple):
 
     @property
     def summary(self) -> dict[str, int]:
-        """Number of rows with each status; statuses without a row are left out."""
+        """Number of rows with each status, by the name of the status; statuses without a row are left out."""
         found: dict[str, int] = {}
         for row in self.rows:
             found[row.status] = found.get(row.status, 0) + 1
@@ -174,5 +174,5 @@ class Report(NamedTuple):
 
     @property
     def status(self) -> str:
-        """Worst status of the missions."""
+        """Worst status of all missions in the report."""
         return worst(mission.status for mission in self.missions)

@@ -8,13 +8,13 @@ from bisar_budget.phrases import Note
 class Requirement(NamedTuple):
     """Result of the draws for one requirement: how often it is met.
 
-    `sum` and `rss` are the sizes of the combined errors, by the rules of `allocation.combine` with these names. They
-    follow from the full model and include the coverage factor; None if a declared error leaves no image. `sigma_rss`
-    is the standard uncertainty by root-sum-square. `sigma` is the standard uncertainty of the draws with an image, or
-    None without such a draw. For displacements `sigma_rss` and `sigma` are rms lengths. `probability` is the fraction
-    of draws that meet the requirement; `probability_low` and `probability_high` are the ends of its Wilson interval.
-    `probability_normal` is the probability for a normal distribution with the variances of the errors. `dominant` is
-    the error with the largest share of the variance.
+    `sum` and `rss` are the sizes of the errors combined according to the rules of `allocation.combine` with these
+    names. They follow from the full model and include the coverage factor; they are None if a declared error leaves
+    no image. `sigma_rss` is the standard uncertainty as the root-sum-square of the errors. `sigma` is the standard
+    uncertainty of the draws with an image; it is None if no draw has an image. For displacements `sigma_rss` and
+    `sigma` are rms lengths. `probability` is the fraction of draws that meet the requirement; `probability_low` and
+    `probability_high` are the ends of its Wilson interval. `probability_normal` is the probability for a normal
+    distribution with the variances of the errors. `dominant` is the error with the largest share of the variance.
     """
 
     id: str
@@ -36,8 +36,9 @@ class Requirement(NamedTuple):
 class MonteCarlo(NamedTuple):
     """Result of the Monte Carlo simulation of one mission.
 
-    `probability` is the probability that all requirements are met at once; None without a requirement. `is_exact`
-    tells whether every draw was computed by exact ranges, because the errors are too large for the linear model.
+    `probability` is the probability that all requirements are met at once; None if there is no requirement.
+    `is_exact` tells whether every draw was computed from exact ranges, because the errors are too large for the
+    linear model.
     """
 
     draws: int

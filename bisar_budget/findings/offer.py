@@ -16,13 +16,13 @@ class OfferedFigure(NamedTuple):
     value : float, optional
         The figure in SI; None if the file of the offer states no figure.
     text : str
-        The figure as the file of the offer writes it.
+        The figure as written in the file of the offer.
     ordered : str
-        The specified size, as text.
+        The size that the sheet specifies, as text.
     is_inside : bool, optional
         Whether the figure meets the specification; None if the two cannot be compared, or if no size is specified.
     remark : str
-        Why `is_inside` is None; otherwise empty.
+        Reason why `is_inside` is None; otherwise empty.
     """
 
     key: str
@@ -34,10 +34,10 @@ class OfferedFigure(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """Result of comparing an offer with a sheet: the file of the offer, its figures, and the verdict of its mission.
+    """Result of comparing an offer with a specification sheet.
 
-    `notes` name the sections, apart from the errors, in which the mission of the offer differs from that of the
-    sheet.
+    It contains the file of the offer, its figures, and the verdict on its mission. `notes` name the sections, apart
+    from the errors, in which the mission of the offer differs from the mission of the sheet.
     """
 
     file: str
@@ -50,6 +50,6 @@ class Offer(NamedTuple):
     def complies(self) -> bool:
         """Whether the mission of the offer meets every requirement.
 
-        Single figures may exceed their specifications.
+        This is possible even if single figures exceed their specifications.
         """
         return exit_code({self.status}, strict=False) == 0

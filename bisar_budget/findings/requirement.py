@@ -22,13 +22,13 @@ REQUIREMENT_NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class DecidingShare:
-    """A share of a requirement whose limit decides the status, in place of the limit of the full requirement.
+    """Limit that decides the status of a requirement in place of the full limit: usually a share of the full limit.
 
-    `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. `owner` is the platform
-    or the clock to which the share belongs. `owner` has three further values, for limits that are not shares:
-    `autofocus` for the pull-in range of autofocus, which limits the sum of all phases; `scene` for the difference
-    between the phases at the edge and at the centre of the scene; and `band` for the phase of dispersion over the
-    radar band.
+    `allowed` and `reached` are in the unit of the requirement, without the gain of autofocus. For a share of the
+    requirement, `owner` is the platform or the clock to which the share belongs. For a limit that is not a share,
+    `owner` names its subject: `autofocus` for the pull-in range of autofocus, which limits the sum of all phases;
+    `scene` for the difference between the phases at the edge and at the centre of the scene; or `band` for the phase
+    of dispersion over the radar band.
     """
 
     owner: str
@@ -40,16 +40,16 @@ class DecidingShare:
 class JudgedRequirement(NamedTuple):
     """A requirement of the mission, with its verdict.
 
-    Numbers are in SI units, radians and decibels; None if a value does not exist. `value` and `allowed` are the
-    requirement as the file states it, or its default. `reached` is the total of the mission; with `combine: each` it
-    is the value of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of the
-    share in `share` if this share decides the status. `autofocus_gain` is the factor by which quadratic phases may
-    exceed the requirement and the shares of the platforms with autofocus; None for requirements on other quantities.
-    `row` is the row that decides the status, `use_row` is the row with the utilization, and `rows` are all rows that
-    judge the requirement. `reason` tells why the requirement cannot be judged, or why it is not met. `waivers` are
-    the waivers that cover the requirement or its rows; empty unless the requirement is waived. `is_unjudged` tells
-    whether it cannot be judged, even if it is waived. `requirement_ids` are the ids that the project gives to the
-    requirement.
+    Numbers are in SI units, radians and decibels; they are None if they are not available. `value` and `allowed` are
+    the requirement as the file states it, or its default. `reached` is the total of the mission; with `combine: each`
+    it is the value of the largest row. `utilization` is the ratio of `reached` to `allowed`, or the utilization of
+    the share in `share` if this share decides the status. `autofocus_gain` is the factor by which autofocus allows
+    quadratic phases to exceed the requirement and the shares of the platforms; None for requirements on other
+    quantities. `row` is the row that decides the status, `use_row` is the row from which `utilization` comes, if it
+    comes from a row, and `rows` are all rows that judge the requirement. `reason` tells why the requirement cannot be
+    judged, or why it is not met. `waivers` are the waivers that cover the requirement or its rows; empty unless the
+    requirement is waived. `is_unjudged` tells whether it cannot be judged, even if it is waived. `requirement_ids`
+    are the ids that the project gives to the requirement.
     """
 
     key: str
@@ -72,13 +72,13 @@ class JudgedRequirement(NamedTuple):
     requirement_ids: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        """Key, reached and allowed value, and status, on one line."""
+        """Show the key, the reached and the allowed value, and the status of the requirement on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.reached, self.allowed))
         return f"<{self.key}: {' of '.join(sizes)} {self.unit}, {self.status}>"
 
     @property
     def waived_by(self) -> tuple[AppliedWaiver, ...]:
-        """Valid waivers; empty unless the requirement is waived."""
+        """Valid waivers that cover the requirement or its rows; empty unless the requirement is waived."""
         return holding(self.status, self.waivers)
 
     @property
@@ -88,7 +88,7 @@ class JudgedRequirement(NamedTuple):
 
     @property
     def requirement_id(self) -> str | None:
-        """Ids of the project for the requirement, joined by commas; None if it has no such id."""
+        """Ids that the project gives to the requirement, joined by commas; None if there is no such id."""
         return ", ".join(self.requirement_ids) or None
 
     @property
@@ -99,7 +99,7 @@ class JudgedRequirement(NamedTuple):
 
 @dataclass(frozen=True)
 class ShiftedFigure:
-    """A level [dB] by which the mission file shifts the figures of one kind of error, relative to their source."""
+    """A noise or vibration spectrum that the mission file shifts by `level_db` [dB], relative to its source."""
 
     kind: str
     key: str
@@ -108,23 +108,24 @@ class ShiftedFigure:
 
     @property
     def level(self) -> str:
-        """Level with its unit, as text."""
+        """The shift in decibels with its unit as text, such as `-3 dB`."""
         return f"{self.level_db:g} dB"
 
     @property
     def off(self) -> str:
-        """Phrase that names the source from which the level shifts the figures, such as `off the data sheet`."""
+        """Phrase that names the source from which the shifted spectrum deviates, such as `off the data sheet`."""
         if self.source is not None:
             return f"off {printable(self.source)}"
         return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
 
 
 class DeclaredKinds(NamedTuple):
-    """Kinds of error that a mission can declare, with the names of `requirements.declare` and their owners.
+    """Kinds of error that a mission can declare.
 
-    `declared` and `missing` together are all kinds. `without_source` are the declared kinds for which the file states
-    no source. `shifted` are the figures that a level shifts, relative to their source. `required` are the names that
-    the file lists in `requirements.declare`.
+    Each kind is named as in `requirements.declare`, such as `transmitter.position`. `declared` and `missing` together
+    are all kinds. `without_source` are the declared kinds for which the file states no source. `shifted` are the
+    noise and vibration spectra that the file shifts by a level in decibels relative to their source. `required` are
+    the names that the file lists in `requirements.declare`.
     """
 
     declared: tuple[str, ...] = ()
@@ -148,7 +149,10 @@ class Override(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """Influences from outside the files on all missions of a run: options, and the origin of the day for waivers."""
+    """Settings that come from outside the mission files and affect all missions of a run.
+
+    `options` are the options of the run. `day_origin` names the origin of the date for which waivers are judged.
+    """
 
     options: tuple[Override, ...] = ()
     day_origin: str = "the caller"

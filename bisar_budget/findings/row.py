@@ -44,7 +44,7 @@ def in_order(waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
 def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
     """Select the waivers of a row or requirement that have not expired.
 
-    The result is empty if `status`, the status of the row or requirement, is not `waived`.
+    `status` is the status of the row or requirement. The result is empty if the status is not `waived`.
     """
     return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
@@ -114,7 +114,7 @@ class Row(NamedTuple):
     is_unjudged: bool = False  # the row cannot be judged, waived or not
 
     def __repr__(self) -> str:
-        """Id, declared and allowed size, and status, on one line."""
+        """Show the id, the declared and the allowed size, and the status of the row on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.declared, self.allowable))
         return f"<{self.id}: {' of '.join(sizes)} {self.unit}, {self.status}>"
 
@@ -125,7 +125,7 @@ class Row(NamedTuple):
 
     @property
     def requirement_id(self) -> str | None:
-        """Ids of the project for the row, joined by commas; None if the file gives it no id."""
+        """Ids that the project gives to the row, joined by commas; None if there is no such id."""
         return ", ".join(self.requirement_ids) or None
 
     @property
@@ -135,19 +135,19 @@ class Row(NamedTuple):
 
     @property
     def waived_by(self) -> tuple[AppliedWaiver, ...]:
-        """Valid waivers; empty unless the row is waived."""
+        """Valid waivers that cover the row; empty unless the row is waived."""
         return holding(self.status, self.waivers)
 
     @property
     def is_of_declare(self) -> bool:
-        """Whether the status comes only from `requirements.declare`, and not from the size of an error."""
+        """Whether the status of the row comes only from `requirements.declare`, and not from the size of an error."""
         return self.metric == DECLARE or (
             isinstance(self.reason, Note) and self.reason.code == "not-declared-as-required"
         )
 
     @property
     def decisive(self) -> tuple[Note, ...]:
-        """Notes that decide the status: the reason, waivers, and images that refute the limit."""
+        """Notes that decide the status of the row: the reason, waivers, and images that refute the limit."""
         reason = (self.reason,) if self.reason else ()
         return (*reason, *(waiver.words for waiver in self.waivers), *self.refuted)
 

@@ -21,16 +21,17 @@ class SatellitePass(NamedTuple):
     number : int
         Number of the pass, from 1.
     start, stop, culmination : Instant
-        Beginning and end of the time above the minimum elevation, and the time of maximum elevation.
+        Beginning and end of the time above the minimum elevation, and time of maximum elevation.
     rises, sets : bool
-        Whether the satellite rises above and sinks below the minimum elevation within the span. `rises` is False if
-        it is already above at the beginning of the span, `sets` if it is still above at the end.
+        Whether the satellite rises above the minimum elevation, and sinks below it, within the span that is searched.
+        `rises` is False if the satellite is already above at the beginning of the span, and `sets` is False if it is
+        still above at the end.
     max_elevation : float
         Elevation at the culmination. [rad]
     track : (n, 2)
         Azimuth and elevation along the pass. [rad]
     center : Instant, optional
-        Mid-time, to a millisecond; None if the squint is never reached.
+        Mid-time, rounded to a millisecond; None if the squint is never reached.
     state : PlatformState, optional
         State of the satellite at the mid-time, in the axes of the scene.
     side : str
@@ -78,12 +79,12 @@ class SatellitePass(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission meets every requirement at the mid-time; a waived mission does not."""
+        """Whether the mission meets every requirement at the mid-time; false for a waived mission."""
         return STATUS[self.status].complies
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the mission complies or is waived, so that `check` exits with 0."""
+        """Whether the mission complies or is waived, so that `check` exits with code 0."""
         return self.complies or self.status == "waived"
 
     @property
@@ -93,12 +94,15 @@ class SatellitePass(NamedTuple):
 
 
 def bearing(azimuth: float) -> float:
-    """Convert an azimuth, counter-clockwise from east, to a bearing, clockwise from north, 0 to 2π. [rad]"""
+    """Convert an azimuth, counter-clockwise from east, to a bearing from 0 to 2π, clockwise from north. [rad]"""
     return (math.pi / 2 - azimuth) % (2 * math.pi)
 
 
 class UnknownTime(NamedTuple):
-    """A time interval within the span in which the orbit of a platform is unknown, with the reason."""
+    """A time interval in which the orbit of a platform is unknown, and the reason.
+
+    The interval lies within the span that is searched for passes.
+    """
 
     platform: str
     start: Instant
@@ -107,7 +111,7 @@ class UnknownTime(NamedTuple):
 
 
 class Passes(NamedTuple):
-    """The passes of one platform's orbit over the scene of a mission, in order of time.
+    """The passes of one platform over the scene of a mission, in chronological order.
 
     `day` is the day on which waivers were judged (UTC).
     """
@@ -138,10 +142,10 @@ class Passes(NamedTuple):
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of passes of each status."""
+        """Number of passes with each status."""
         return Counter(each.status for each in self.found)
 
     @property
     def waived_by(self) -> tuple[str, ...]:
-        """Ids of the waivers of all waived passes, each once."""
+        """Ids of the waivers of all waived passes, without duplicates."""
         return tuple(dict.fromkeys(waiver for each in self.found for waiver in each.waived_by))

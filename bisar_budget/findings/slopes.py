@@ -12,7 +12,7 @@ _MAX_LOG_RATIO = math.log(1e6)  # a number that would have to change by a larger
 
 
 class Skipped(NamedTuple):
-    """A key for which no slope is computed: its text in the file, and the reason."""
+    """A number for which no slope is computed: its key, its text in the file, and the reason."""
 
     key: str
     text: str
@@ -27,30 +27,31 @@ class Slope(NamedTuple):
     key, text : str
         Key of the number, and its value as written in the file.
     value, unit : float, str
-        The value in its unit. For a covariance the value is 1, the factor by which its sigmas are multiplied.
+        Value of the number, and the unit of this value. For a covariance the value is 1, the factor by which its
+        sigmas are multiplied.
     per, per_text : float, str
-        Increase of the number that causes `change`. `per` is in SI and has the sign of the value; `per_text` is text
-        such as `1 dB`.
+        Increase of the number that causes `change`. `per` is in SI and has the sign of the value; `per_text` is the
+        same increase as text, such as `1 dB`.
     step : float
         Step by which the number is changed, in SI. A central difference spans two steps.
     difference : str
         Kind of difference: `central`, or `forward` or `backward` over two steps if the mission is invalid on one
         side.
     change, row_change : float
-        Change of the worst utilization, and change of the requested row's utilization. `row_change` is None without a
-        requested row.
+        Change of the worst utilization, and change of the utilization of the requested row. `row_change` is None if
+        no row is requested.
     row_below, row_above : str
         Rows with the worst utilization at the two ends of the difference: where the number is smaller, and where it
-        is larger. A number that is changed by a fraction of itself is compared by magnitude.
+        is larger. For a number that is changed by a fraction of itself, smaller and larger refer to its magnitude.
     is_mixed : bool
-        Whether the row with the worst utilization differs between the ends of the difference and the value of the
-        file. The change then mixes the slopes of two rows.
+        Whether the row that is worst at the value in the file is no longer the worst row at an end of the difference.
+        The change then mixes the slopes of two rows.
     part : str
-        Part of the catalogue from which the number is taken; empty if the file states it.
+        Part of the catalogue from which the number is taken; empty if the file states the number itself.
     measure : float
-        The increase `per` as a dimensionless ratio, so that numbers of all kinds can be compared. It is relative to
-        the number itself. For a direction it is relative to one radian, for a level in decibels to the power, and for
-        a latitude or longitude to the smaller slant range.
+        The increase `per` as a dimensionless ratio, so that numbers of all kinds can be compared. Usually the
+        reference is the value of the number itself. For a direction the reference is one radian, for a level in
+        decibels the corresponding power, and for a latitude or longitude the smaller slant range.
     """
 
     key: str
@@ -71,32 +72,35 @@ class Slope(NamedTuple):
 
     @property
     def given(self) -> str:
-        """Value as the file writes it, with the part of the catalogue from which it is taken."""
+        """Value as written in the file, followed by the catalogue part from which it is taken, if any."""
         return f"{self.text} ({self.part})" if self.part else self.text
 
     @property
     def effect(self) -> float:
-        """Change of the utilization of the requested row, or of the worst utilization without a requested row."""
+        """Change of the utilization of the requested row, or of the worst utilization if no row is requested."""
         return self.change if self.row_change is None else self.row_change
 
     @property
     def even_effect(self) -> float:
-        """Effect of an increase for which `measure` would be 1 %, to compare numbers of different kinds."""
+        """Effect of an increase by 1 %, to compare numbers of different kinds.
+
+        The increase is 1 % in terms of the dimensionless ratio `measure`.
+        """
         return self.effect * COMPARED_CHANGE_FRACTION / self.measure
 
     @property
     def is_proportional(self) -> bool:
-        """Whether `per` is 1 % of the value of the number."""
+        """Whether the increase `per` is 1 % of the value of the number."""
         return self.per_text == "1 %"
 
 
 class Relaxed(NamedTuple):
-    """Effect of doubling one error of a mission on its other errors, once the shares are balanced again.
+    """Effect that doubling one error of a mission has on the other errors, once the shares are balanced again.
 
-    `shares_before` and `shares_after` are the shares of transmitter and receiver. `transmitter` and `receiver` each
-    contain the worst row of the platform after the doubling, and the worst utilization of the platform before and
-    after it. Only judged rows of errors that are not doubled are included. The value is None for a platform without
-    such rows.
+    `shares_before` and `shares_after` are the shares of transmitter and receiver before and after the doubling.
+    `transmitter` and `receiver` each contain the worst row of the platform after the doubling, and the worst
+    utilization of the platform before and after the doubling. Only judged rows of errors that are not doubled count.
+    The field of a platform is None if it has no such rows.
     """
 
     key: str
@@ -112,12 +116,12 @@ class Relaxed(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """Effects of the numbers of one mission on its utilization, the largest effect first.
+    """Effects of the numbers of one mission on its utilization, with the largest effect first.
 
     `worst_row` has the worst utilization of all judged rows that can fail; `requirement` sets its allowable. `row` is
-    the requested row, or None. If it is set, the numbers are sorted by their effects on it. `unchanging` are keys of
-    numbers without any effect. `relaxed` is empty if shares are not balanced. `overrides` are influences on the
-    result from outside the mission file.
+    the requested row, or None. If a row is requested, the numbers are sorted by their effects on it. `unchanging` are
+    keys of numbers without any effect. `relaxed` is empty if shares are not balanced. `overrides` are influences on
+    the result from outside the mission file.
     """
 
     file: str
@@ -139,15 +143,16 @@ class Sensitivity(NamedTuple):
 
     @property
     def asked(self) -> float:
-        """Utilization of the requested row, or the worst utilization without a requested row."""
+        """Utilization of the requested row, or the worst utilization if no row is requested."""
         return self.utilization if self.row_utilization is None else self.row_utilization
 
     def to_limit(self, slope: Slope) -> float | None:
-        """Change of one number, with its sign and in its unit, at which the utilization would be 1.
+        """Change of one number, with its sign and in the unit of the number, at which the utilization would be 1.
 
-        The utilization is extrapolated as a power of the number, or as an exponential function of a level or an
-        angle. This is exact for numbers that follow such a law, such as the aperture time or an error. Returns None
-        if the change is more than a factor of a million, or more than half a turn.
+        The utilization is extrapolated as a power of the number, or as an exponential function of a level in decibels
+        or of an angle. This is exact for numbers that follow such a law, for example the aperture time or an error.
+        Returns None if the number would change by more than a factor of a million, or an angle by more than half a
+        turn.
         """
         if not slope.effect or self.asked <= 0:
             return None

@@ -33,8 +33,9 @@ class State(NamedTuple):
 class Crossing(NamedTuple):
     """A border of compliance: the last value that complies, and the next value, which does not comply.
 
-    The values of `inside` and `outside` differ by 1e-6 of the value. `is_upper` tells whether the values below the
-    border comply. `is_verified` tells whether checks of the mission with the texts of both values confirm the border.
+    `inside` is the state that complies, and `outside` is the state that does not. The relative difference of the two
+    values is at most 1e-6. `is_upper` tells whether the values below the border comply. `is_verified` tells whether
+    the border is confirmed by checks of the mission with both values as they would be written in the mission file.
     """
 
     inside: State
@@ -44,7 +45,7 @@ class Crossing(NamedTuple):
 
 
 class Imaged(NamedTuple):
-    """Verdict of the image on the row that binds at a solution.
+    """Comparison of a simulated image with the limit of the binding row at a solution.
 
     `at` is the solution as text. `verdict` is None if no image can show the limit of the row. `reason` tells why
     there is no verdict, or what the verdict is based on; it may be empty.
@@ -57,7 +58,10 @@ class Imaged(NamedTuple):
 
     @property
     def is_optimistic(self) -> bool:
-        """Whether the image at the limit, with or without autofocus, shows a larger error than the limit allows."""
+        """Whether the limit is optimistic: the image at the limit shows a larger error than the limit allows.
+
+        Images with and without autofocus are considered.
+        """
         return self.verdict is not None and "optimistic" in (self.verdict.verdict, self.verdict.verdict_autofocus)
 
 
@@ -69,27 +73,27 @@ class Solution(NamedTuple):
     key, unit : str
         Key of the number, and unit of its values.
     is_scale : bool
-        Whether the values are factors of all numbers below the key.
+        Whether the values are factors that multiply all errors below the key.
     low, high : float
         Ends of the range.
     is_circle : bool
-        Whether the ends are the same direction.
+        Whether the two ends of the range are the same direction, so that the range is a full circle.
     given : State, optional
-        State at the value of the file.
+        State at the value in the mission file.
     nearest : State
         The state with the smallest excess if no value complies; the state with the smallest margin if all comply.
     is_constant : bool
-        Whether the number has no effect on the utilization that decides.
+        Whether the number has no effect on the utilization that decides the verdict.
     skipped, waived : int
-        Number of samples with an invalid mission, and number of waived samples.
+        Number of samples at which the mission is invalid, and number of samples at which it is waived.
     waived_by : tuple of str
-        Ids of the waivers of waived samples.
+        Ids of the waivers that apply to the waived samples.
     texts : mapping of float to str
-        Every value as the file would write it.
+        Every value of the solution, as it would be written in the mission file.
     imaged : Imaged, optional
         Verdict of images at the best crossing, if images were formed.
     overrides : tuple of Override
-        Influences from outside the file.
+        Influences on the verdict that are not in the mission file, such as command-line options.
     """
 
     file: str
@@ -117,7 +121,7 @@ class Solution(NamedTuple):
 
     @property
     def value(self) -> float | None:
-        """Largest value at which compliance ends or begins; None without such a value."""
+        """Largest value at which compliance ends or begins; None if there is no such value."""
         return max((crossing.inside.value for crossing in self.crossings), default=None)
 
     @property
@@ -127,15 +131,15 @@ class Solution(NamedTuple):
 
     @property
     def is_monotonic(self) -> bool:
-        """Whether compliance changes at most once."""
+        """Whether compliance changes at most once in the searched range."""
         return len(self.crossings) <= 1
 
     @property
     def status(self) -> str:
-        """Whether values in the range comply: `crossing`, `all`, `none` or `waived`.
+        """Compliance of the values in the range: `crossing`, `all`, `none` or `waived`.
 
-        `crossing` means that compliance changes in the range. `waived` is returned if no value complies and some
-        values are waived.
+        `crossing` means that compliance changes in the range, and `all` that every value complies. If no value
+        complies, the result is `waived` if some values are waived, and `none` otherwise.
         """
         if self.crossings:
             return "crossing"
@@ -143,7 +147,11 @@ class Solution(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """Verdict of a mission: whether it complies, its status, and the binding row; see `State` of `solve`."""
+    """Verdict of a mission: whether it complies, its status, and the binding row.
+
+    `requirement` is the requirement that sets the allowable of the binding row `row`, and `waived_by` are the ids of
+    the waivers that apply.
+    """
 
     complies: bool
     status: str
@@ -163,15 +171,15 @@ class PartState(NamedTuple):
     is_given : bool
         Whether the mission file names this part.
     figures : tuple of str
-        Figures that the mission takes from the part; figures of the mission file override them.
+        Figures that the mission takes from the part. A figure that the mission file states itself is not taken.
     standing : Standing
         Verdict of the mission.
     own_row, own_utilization : str, float, optional
         Row with the highest utilization among the rows that depend only on `figures`, and its utilization.
     reason : str
-        Why the mission does not comply, if no row is the cause; otherwise empty.
+        Reason why the mission does not comply, if no row is the cause; otherwise empty.
     silent_on : tuple of str
-        Figures that other parts of the same kind state and this part does not. They stay undeclared.
+        Figures that other parts of the same kind state but this part does not. They remain undeclared.
     """
 
     id: str
@@ -197,9 +205,9 @@ class Comparison(NamedTuple):
 
     `parts` lists the complying parts in ascending order of margin, followed by all other parts in ascending order of
     excess. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds, which remain in the
-    mission. `overridden` are figures of parts that the mission file overrides. `imaged` is the verdict of images with
-    the first complying part, if images were formed. `overrides` are settings outside the mission file that influence
-    the verdict.
+    mission. `overridden` are figures of parts that the mission file overrides. `imaged` is the verdict of simulated
+    images with the first complying part, if images were formed. `overrides` are settings outside the mission file
+    that influence the verdict.
     """
 
     file: str
@@ -223,7 +231,7 @@ class Comparison(NamedTuple):
 
     @property
     def status(self) -> str:
-        """How many parts comply: `all`, `some` or `none`; `waived` if no part complies and some parts are waived."""
+        """Which parts comply: `all`, `some` or `none`; `waived` if no part complies but some parts are waived."""
         count = len(self.complying)
         if count:
             return "all" if count == len(self.parts) else "some"

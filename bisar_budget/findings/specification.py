@@ -1,4 +1,4 @@
-"""Sheet of specifications: specified sizes of errors that together meet every requirement, and their shares."""
+"""Specifications of a mission's errors: sizes that together meet every requirement, and shares of the limits."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 class Specification(NamedTuple):
     """Specification of one error: its largest permitted size, computed and rounded for a purchase order.
 
-    `value` is the computed size, `ordered` is this size rounded down, which is the specified value, and `text` is the
+    `value` is the computed size. `ordered` is the specified value: the computed size rounded down. `text` is the
     specified value as written in a mission file. If no requirement limits the error, `value` and `ordered` are None
     and `text` is empty. `found_text` is the text of `value` in the same unit. `remark` explains the number to a
-    supplier. `declared` is the declared size in the file, the largest of three axes. `shares` has the share of the
-    error in each requirement, in the row where it is largest. `parts` are the parts of the catalogue that meet the
-    specified value.
+    supplier. `declared` is the declared size in the file, the largest of three axes. `shares` maps each requirement
+    to the fraction of its limit that the error uses, in the row in which this fraction is largest. `parts` are the
+    parts of the catalogue that meet the specified value.
     """
 
     key: str
@@ -50,7 +50,7 @@ class Specification(NamedTuple):
 
 
 class RowUse(NamedTuple):
-    """Utilization of one row with the computed sizes, and the shares of the errors in it.
+    """Utilization of one row with the computed sizes of the errors, and the share of each error in it.
 
     `requirement` is the requirement that judges the row; None if no requirement covers the effect, which must then
     stay negligible. `used` is the utilization of the row, and `allowed` is its limit. `fixed` is the share of the
@@ -87,11 +87,11 @@ class Broken(NamedTuple):
 class SpecificationSheet(NamedTuple):
     """Specifications for the errors of one mission that together meet every requirement.
 
-    `findings` are the findings of a check with the specified values, `status` is its status, and `requirements` are
-    the requirements as judged by it. `rows` are the rows that limit a specification. `broken` are the rows in which
-    the errors without a specification leave no room. If there is such a row, the specifications have no values.
-    `reserve` is the fraction of every limit that is kept free. `notes` name the differences between the checked
-    mission and the mission file.
+    `findings` are the findings of a check with the specified values. `status` is the status of this check, and
+    `requirements` are the requirements as this check judges them. `rows` are the rows that limit a specification.
+    `broken` are the rows in which the errors without a specification leave no room for specified errors. If there is
+    such a row, the specifications have no values. `reserve` is the fraction of every limit that is kept free. `notes`
+    name the differences between the checked mission and the mission file.
     """
 
     file: str

@@ -13,10 +13,10 @@ class Status(NamedTuple):
     `gates` tells whether the status of a row can become the status of its mission. `fails` and `fails_strict` tell
     whether the status makes a run, or a strict run, fail. `is_judged` tells whether a row counts as judged, even if
     the comparison with a requirement was not possible. `is_met` tells whether the requirement is met. `is_explained`
-    tells whether reports give the reason for the status. `sarif` and `github` are levels of findings; if one is
-    empty, the status is no finding in that format. `junit` is the outcome of a test case: failure, skipped, passed,
-    or passed with a remark. `verdict` is the verdict on a mission in a compliance report. `sgr` is the colour on a
-    terminal (ECMA-48), `color` is the colour on a page, and `symbol` is the mark before the status.
+    tells whether reports give the reason for the status. `sarif` and `github` are levels of findings; if a level is
+    empty, the status is not reported as a finding in that format. `junit` is the outcome of a test case: failure,
+    skipped, passed, or passed with a remark. `verdict` is the verdict on a mission in a compliance report. `sgr` is
+    the colour on a terminal (ECMA-48), `color` is the colour on a page, and `symbol` is the mark before the status.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Status(NamedTuple):
 
     @property
     def is_held(self) -> bool:
-        """Whether a number was compared with a limit and the comparison is binding: evaluated, and not waived."""
+        """Whether a number was compared with a limit and the verdict holds: it was evaluated, and is not waived."""
         return self.is_judged and not self.junit_words
 
     @property

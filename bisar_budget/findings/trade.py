@@ -56,7 +56,7 @@ class Trade(NamedTuple):
 
     @property
     def statuses(self) -> list[str]:
-        """Statuses that occur, worst first."""
+        """Statuses that occur in the sweep, from worst to best."""
         return sorted(set(self.values["status"].ravel().tolist()), key=RANK.__getitem__)
 
 

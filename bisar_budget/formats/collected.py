@@ -2,8 +2,8 @@
 
 Slow time is the time at which a pulse is at the scene point. The pulse leaves the transmitter R_t/c earlier and
 reaches the receiver R_r/c later, where R_t and R_r are the slant ranges. At a slow time, the path of the transmitter
-has its position at the transmission of the pulse, and the path of the receiver its position at the reception. The sum
-of both ranges at a slow time is therefore the range sum of that pulse.
+gives the transmitter's position at the transmission of the pulse, and the path of the receiver gives the receiver's
+position at its reception. The sum of both ranges at a slow time is therefore the range sum of that pulse.
 
 `ErrorParameters` of CPHD 1.1.0 and `ErrorStatistics` of SICD, volume 1, state sigmas of position and velocity, P1 to
 V3, with their correlations. CRSD 1.0 and the bistatic part of SICD state covariance matrices. SICD, volume 3, defines
@@ -56,11 +56,11 @@ class NoPathError(ValueError):
 
 @dataclass(frozen=True)
 class DeclaredMotionError:
-    """Standard deviations of the measured path of one platform, along the axes of a frame of the mission.
+    """Standard deviations of the errors in one platform's measured path, along the axes of a frame of the mission.
 
-    `position` [m], `velocity` [m/s] and `acceleration` [m/s²] have one sigma for each axis; None means not declared.
-    `correlation` contains the correlations (6, 6) of position and velocity; it is empty if there are none.
-    `distribution` is the name of the distribution, as a mission file writes it.
+    `position` [m], `velocity` [m/s] and `acceleration` [m/s²] have one sigma for each axis, or are None if not
+    declared. `correlation` contains the correlations (6, 6) of position and velocity; it is empty if they are
+    uncorrelated. `distribution` is the name of the distribution, as written in a mission file.
     """
 
     frame: str
@@ -80,7 +80,7 @@ class DeclaredMotionError:
 
 @dataclass(frozen=True)
 class ReferenceGeometry:
-    """Slow time [s], slant ranges [m] and bistatic angle [rad] at the reference pulse or time of a file."""
+    """Slow time [s], slant ranges [m] and bistatic angle [rad] at the reference pulse or time of a radar file."""
 
     slow_time: float
     transmitter_range: float
@@ -90,7 +90,7 @@ class ReferenceGeometry:
 
 @dataclass(frozen=True)
 class FileErrors:
-    """Errors that a radar file declares: motion errors of each platform or common to both, and errors of the clocks.
+    """Errors that a radar file declares: motion errors of each platform or of both in common, and clock errors.
 
     `timing_constant` is the standard deviation of the delay [s]. `timing_linear` is the standard deviation of the
     relative difference of the clock frequencies. `remarks` explain how the errors were converted, and what could not
@@ -110,9 +110,9 @@ class FileErrors:
 class Imported:
     """Scene, band, aperture, paths and errors that are read from a radar file.
 
-    If `is_monostatic`, transmitter and receiver are one platform, so that its errors are the same for transmission
-    and reception. `remarks` are sentences for the reader of the mission file. `unused` is a remark on the vectors
-    (records of pulses) of the file that are not used; it is empty if all are used.
+    If `is_monostatic`, transmitter and receiver are the same platform, so that its errors are the same for
+    transmission and reception. `remarks` are sentences for the reader of the mission file. `unused` is a remark on
+    the vectors (records of pulses) of the file that are not used; it is empty if all vectors are used.
     """
 
     file: str
@@ -156,8 +156,8 @@ def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_
     The order of the polynomial is the lowest at which no position is farther from the path than 1/1000 of the
     wavelength, so that the phase error is negligible. The highest order is 4, because a mission states position,
     velocity, acceleration, jerk and snap. If even this order is not sufficient, the function takes the lowest order
-    whose rms residual is at most 1/0.9 of that of the highest order. The residuals are then noise of the positions,
-    or motion that is faster than such a polynomial.
+    whose rms residual is at most 1/0.9 times the rms residual of the highest order. The residuals are then position
+    noise, or motion that is faster than such a polynomial.
 
     `times` (n,) are slow times in seconds; `positions` (n, 3) are in metres along the axes of the scene.
 
@@ -309,8 +309,8 @@ def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
 def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) -> FileErrors:
     """Read the errors that `ErrorParameters` of CPHD or `ErrorStatistics` of SICD states as sigmas.
 
-    `parameters` is this element. If it is None, or has no errors that a mission can express, the result contains only
-    a remark that says so.
+    `parameters` is the element with this name. If it is None, or has no errors that a mission can express, the result
+    contains only a remark to this effect.
     """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
@@ -347,7 +347,7 @@ def _of_monostatic(mono: Element, seen: Seen) -> FileErrors:
 
 
 def _common(declared_error: DeclaredMotionError, remarks: list[str]) -> FileErrors:
-    """Make the errors of a monostatic file, in which one platform transmits and receives.
+    """Convert the errors of a monostatic file, in which one platform transmits and receives.
 
     Errors that are the same along all axes become errors common to transmitter and receiver. Other errors are stated
     once for the transmitter and once for the receiver, with a remark that they have to be added.

@@ -82,15 +82,15 @@ class Element:
         return "/" + "/".join(reversed(steps))
 
     def fault(self, problem: str, below: str = "") -> FormatError:
-        """Make an error whose message names the file, this element or the path `below` it, and the problem."""
+        """Make an error whose message names the file, the problem, and this element or the path `below` it."""
         return FormatError(self.file, f"{self.path}{'/' + below if below else ''} {problem}")
 
     def all(self, path: str) -> list["Element"]:
-        """All elements at a path below this element; empty if there are none."""
+        """All elements at a path below this element; empty if there are no such elements."""
         return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
 
     def maybe(self, path: str) -> "Element | None":
-        """First element at a path, or None if there is none; an empty path gives the element itself."""
+        """First element at a path, or None if there is no such element; an empty path gives this element itself."""
         node = self.node.find(_any_namespace(path)) if path else self.node
         return None if node is None else Element(self.file, node)
 
@@ -102,7 +102,7 @@ class Element:
         return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First of the elements at a path whose child element `child` has the text `text`; None if there is none."""
+        """First element at a path whose child `child` has the text `text`; None if there is no such element."""
         return next(
             (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
         )
@@ -135,7 +135,10 @@ class Element:
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
     def polynomial(self, path: str = "", variables: int = 1) -> Floats:
-        """Read the coefficients of a polynomial at a path, an array (order1 + 1, …) with one axis per variable."""
+        """Read the coefficients of a polynomial at a path, as an array with one axis for each variable.
+
+        The shape is (order + 1,) for one variable, and (order1 + 1, order2 + 1) for two.
+        """
         node = self.one(path)
         numbers = range(1, variables + 1)
         coefficients = np.zeros([node._attribute(f"order{number}", _MAX_POLYNOMIAL_ORDER) + 1 for number in numbers])
@@ -147,13 +150,13 @@ class Element:
         return coefficients
 
     def path_polynomial(self, path: str) -> Floats:
-        """Read the coefficients (order + 1, 3) of a position as polynomials of time, with the columns X, Y and Z."""
+        """Read the coefficients of a position as polynomials of time, (order + 1, 3), with the columns X, Y and Z."""
         axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
         most = max(axis.size for axis in axes)
         return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
 
     def matrix(self, path: str, size: int) -> Floats:
-        """Read a symmetric matrix (size, size) from `Entry` elements.
+        """Read a symmetric matrix (size, size) from the `Entry` elements at a path.
 
         The file may state only one of the two equal entries (i, j) and (j, i). Entries that it does not state are 0.
         """

@@ -1,10 +1,10 @@
 """Export of a simulated phase history as CPHD 1.1.0 (NGA.STND.0068-1).
 
-The signal is computed from the true ranges, and the file states the measured positions. Both differ by the declared
-errors, as in recorded data, so that an image formed with the stated positions is displaced and defocused. The signal
-is in the frequency domain, and SGN is −1. A point whose echo arrives ΔTOA later than the echo of the reference point
-has the signal exp(−j2π fx ΔTOA), as in the signal model of the standard. The reference point (SRP) is the scene
-centre.
+The signal is computed from the true paths of the platforms, whereas the file states the measured positions. The two
+differ by the declared errors, as in recorded data, so that an image formed with the stated positions is displaced and
+defocused. The signal is in the frequency domain, and SGN is −1. A point whose echo arrives ΔTOA later than the echo
+of the reference point has the signal exp(−j2π fx ΔTOA), as in the signal model of the standard. The reference point
+(SRP) is the scene centre.
 """
 
 import hashlib
@@ -73,7 +73,7 @@ _VECTOR_WORDS = (
 
 @dataclass(frozen=True)
 class Exported:
-    """Bytes of an exported CPHD file, with the numbers of its vectors, samples per vector and scatterers.
+    """Bytes of an exported CPHD file, and the numbers of its vectors, samples per vector and scatterers.
 
     `half` is half the side length of the image area [m]. `remarks` state which values were assumed because the
     mission does not state them.
@@ -437,10 +437,11 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
 
 # ---------------------------------------------------------------------- declared errors
 def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
-    """Make the elements of `ErrorParameters` from the declared errors of both platforms; empty if there are none.
+    """Make the elements of `ErrorParameters` from the declared errors of both platforms.
 
-    The elements state declared sizes as one sigma, without the coverage factor. The sigmas of each platform include
-    the errors that both platforms share. Errors for which the standard has no element are in `AddedParameters`.
+    The result is empty if no errors are declared. The elements state declared sizes as one sigma, without the
+    coverage factor. The sigmas of each platform include the errors that both platforms share. Errors for which the
+    standard has no element are in `AddedParameters`.
     """
     added: dict[str, str] = {}
     leaves: _Leaves = {}

@@ -54,7 +54,7 @@ class _Pulses:
 
     @property
     def unused_words(self) -> str:
-        """Text that states how many vectors of the file are not used, and why; empty if all are used."""
+        """Text that states how many vectors of the file are not used, and why; empty if all vectors are used."""
         if not self.unused:
             return ""
         count = self.sent.size + self.unused
@@ -94,7 +94,10 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
 
 # ---------------------------------------------------------------------- CPHD
 def _cphd(container: Container, channel: str | None) -> Imported:
-    """Import CPHD 1.0.1 or 1.1.0 (NGA.STND.0068-1) from its vectors, or from `ReferenceGeometry` if it has none."""
+    """Import CPHD 1.0.1 or 1.1.0 (NGA.STND.0068-1).
+
+    The collection is read from the vectors of the file, or from `ReferenceGeometry` if the file has no vectors.
+    """
     xml = container.xml
     channel, parameters = _chosen(xml, channel, "Channel/Parameters", "Identifier")
     center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
@@ -296,7 +299,7 @@ def _crsd(container: Container, channel: str | None) -> Imported:
 def _pulses_of_crsd(
     container: Container, vectors: Records, transmit_vectors: Records, point: Vector, parameters: Element
 ) -> _Pulses:
-    """Read the pulses, and compute when and where the echo of the scene point is received for each of them.
+    """Read the pulses, and compute when and where the echo of the scene point is received for each pulse.
 
     The file states position and velocity of the receiver at the start of the receive window. With this velocity the
     position is extrapolated to the time of the echo, less than a millisecond later.

@@ -1,4 +1,4 @@
-"""Mission files: their keys with types and meanings (`model`), and the reader of such files (`load`)."""
+"""Mission files: the keys with their types and meanings (`model`), and the functions that read a file (`load`)."""
 
 # What other rooms may use.
 __all__ = [

@@ -1,8 +1,8 @@
-"""Changes of single keys of a mission, as the options `--set KEY=VALUE` make them, and hints for unknown keys.
+"""Changes of single keys of a mission with the option `--set KEY=VALUE`, and hints for unknown keys.
 
-`--set KEY=VALUE` changes a value for one run only. The value goes into the tree of the file before the tree is
-interpreted, so every check works as for a value in the file. `KEY=null` removes the key. The known keys are those
-that the readers of the mission (`readers`) define.
+`--set KEY=VALUE` changes a value for one run only. The value is put into the tree of the parsed file before the tree
+is interpreted, so it is checked in the same way as a value in the file. `KEY=null` removes the key. The known keys
+are defined by the readers of the mission (`readers`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,7 @@ _WITH_DOTTED_KEYS = (("requirement_ids",), ("requirement_texts",), ("specificati
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
-    """Split the `KEY=VALUE` text of each option into key and value.
+    """Split the string `KEY=VALUE` of each option `--set` into its key and its value.
 
     Raises
     ------
@@ -66,14 +66,15 @@ def parts_of(key: str) -> tuple[str, ...]:
 
 
 def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
-    """Put the value of each option into the tree of a mission file; invalid values become faults of the tree.
+    """Put the value of each option `--set` into the tree of a mission file, and report invalid values as faults.
 
-    A value replaces the value of the file. If the file has no such value, it is added. A null removes the key.
+    The value replaces the value in the file, or is added if the file has no such value. A null removes the key.
 
     Raises
     ------
     UnusableError
-        The tree has too many faults, or a fault after which it cannot be read further. The tree contains the fault.
+        The tree has too many faults, or a fault after which it cannot be read further. The fault is stored in the
+        tree.
     """
     for change in changes:
         if takes_out(change):
@@ -83,15 +84,15 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
 
 
 def takes_out(change: SetValue) -> bool:
-    """Whether an option removes a key, that is, sets it to a YAML null: `--set requirements.islr=null`."""
+    """Whether an option removes a key by setting it to a YAML null, as in `--set requirements.islr=null`."""
     return not isinstance(change, SetNumber) and change.text in NULLS and change.text != ""
 
 
 def _take_out(tree: Tree, change: SetValue) -> None:
     """Remove the key that an option sets to null from the tree.
 
-    A known key that is missing from the file is not a fault. An unknown key is a fault, and so is an entry of a
-    list.
+    If a known key is missing from the file, there is nothing to remove, which is not a fault. An unknown key is a
+    fault, and so is an entry of a list, because null cannot remove it.
     """
     steps = parts_of(change.key)
     container: Content = tree.root
@@ -123,7 +124,7 @@ def _take_out(tree: Tree, change: SetValue) -> None:
 
 
 def _apply(tree: Tree, change: SetValue) -> None:
-    """Put a value at its path in the tree, and add missing sections along the path."""
+    """Put the value of an option into the tree at the path of its key; missing sections on the path are added."""
     steps = parts_of(change.key)
     container: Content = tree.root
     path: KeyPath = ()
@@ -160,10 +161,10 @@ def _apply(tree: Tree, change: SetValue) -> None:
 def next_name(
     container: Content, steps: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """Split a path into the first key or index, which belongs to `container`, and the remaining steps.
+    """Split the steps of a path into the first key or index, which belongs to `container`, and the remaining steps.
 
-    The first key or index is None if the container cannot have it. A key may contain dots itself. With
-    `has_dotted_keys` all steps together are one key, joined by dots.
+    The first key or index is None if the container cannot have it. A key may itself contain dots. If
+    `has_dotted_keys`, all steps together are a single key, joined by dots.
     """
     if isinstance(container, list):
         is_entry = is_index(steps[0]) and int(steps[0]) <= len(container)
@@ -179,7 +180,7 @@ def next_name(
 
 
 def _put(container: Content, name: str | int, value: object) -> None:
-    """Set a value at a key of a mapping or at an index of a list; an index equal to the list's length appends it."""
+    """Set a value at a key of a mapping or at an index of a list; an index equal to the length appends the value."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
     else:
@@ -187,7 +188,7 @@ def _put(container: Content, name: str | int, value: object) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
-    """Parse the value that an option sets, as if it were in the file; a number of a sweep needs no parsing.
+    """Parse the value that an option sets, as if it were in the file; a number from a sweep is not parsed.
 
     Faults are added to the tree and name the option. Returns `INVALID` for a string that cannot be parsed.
     """
@@ -210,7 +211,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
 
 
 def _forget(tree: Tree, path: KeyPath) -> None:
-    """Delete the file positions of a value and of all values inside it, so that no fault refers to them."""
+    """Delete the file positions of a replaced value and of all values inside it, so that no fault refers to them."""
     for events in (tree.keys, tree.values):
         for key_path in [key_path for key_path in events if key_path[: len(path)] == path]:
             del events[key_path]
@@ -231,7 +232,7 @@ def all_keys() -> tuple[str, ...]:
 
 
 def _below(reader: Reader[object], path: str) -> Iterator[str]:
-    """Yield the paths of all keys inside the value that a reader reads; `path` is the path of that value."""
+    """Yield the paths of all keys below `path`, the path of a value that `reader` reads."""
     if isinstance(reader, OneOf):
         for form in reader.forms:
             yield from _below(form, path)
@@ -247,10 +248,10 @@ def _below(reader: Reader[object], path: str) -> Iterator[str]:
 
 
 def nearest_keys(path: str) -> str:
-    """Hint for the path of an unknown key: the nearest known path, or the sections that have its last key.
+    """Hint for the path of an unknown key: the most similar known path, or the sections that have its last key.
 
     A misspelt key is compared only with the keys of its own section. A path that lacks its first sections is compared
-    with the known paths that have the same end. The hint is empty if neither gives a known path.
+    with the known paths that end in the same way. The hint is empty if neither comparison gives a known path.
     """
     path = path[:_MAX_PATH_CHARACTERS]
     steps = parts_of(path)
@@ -271,11 +272,11 @@ def nearest_keys(path: str) -> str:
 
 
 def section_hint(path: str, near: str) -> str:
-    """Hint for the path of an unknown key: the sections that have its last key, or else the hint `near`.
+    """Hint for the path of an unknown key: the sections in which its last key is known, or else the hint `near`.
 
-    `near` is a hint that names a similar key. It is returned if the key resembles a key of its own section, or if no
-    section has the key. Otherwise the hint names the sections whose paths share the most leading keys with this path.
-    It is empty if there are more than `_MAX_HINT_PATH_COUNT` such sections.
+    `near` is a hint that names a similar key. It is returned if the last key resembles a key of its own section, or
+    if no section has this key. Otherwise the hint names the sections whose paths share the most leading keys with
+    this path. The hint is empty if there are more than `_MAX_HINT_PATH_COUNT` such sections.
     """
     *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
     sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
@@ -295,25 +296,28 @@ def _is_key(name: str) -> bool:
 
 
 def _names(path: str) -> list[str]:
-    """Keys in a path, without the indices of lists."""
+    """Split a path into its keys, leaving out the indices of lists."""
     return [step for step in parts_of(path) if not step.isdigit()]
 
 
 def _keys_of(section: Sequence[str]) -> list[str]:
-    """Names of the keys directly in a section; `section` holds the keys of the section's path."""
+    """Names of the keys directly in a section; `section` lists the keys on the path of the section."""
     path = ".".join(section)
     return [key.rpartition(".")[2] for key in all_keys() if key.rpartition(".")[0] == path]
 
 
 def _split(names: list[str]) -> tuple[str, str]:
-    """Split a path of keys into its longest beginning that is a known path, and the rest; either may be empty."""
+    """Split a path into its longest leading part that is a known path, and the rest; either may be empty.
+
+    `names` are the keys of the path. In both results, the keys are joined by dots.
+    """
     paths = all_keys()
     count = next((count for count in range(len(names), 0, -1) if ".".join(names[:count]) in paths), 0)
     return ".".join(names[:count]), ".".join(names[count:])
 
 
 def _spelt_right(steps: Sequence[str]) -> str:
-    """Replace each unknown key of a path by the most similar key of its section.
+    """Replace each unknown key of a path by the most similar key of its section, and return the path.
 
     Returns an empty string if an unknown key has no similar key.
     """
@@ -369,20 +373,19 @@ ACCEPTED_ERRORS = (
 def is_error(key: str) -> bool:
     """Whether a key states the size of an error, such as `timing_error.quadratic`.
 
-    All keys in the sections that declare errors state sizes, except for intervals, frequencies and similar
-    numbers.
+    In the sections that declare errors, every key states a size, except for keys such as intervals and frequencies.
     """
     steps = parts_of(key)
     return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
-    """Name of an error as used in row ids: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    """Name of an error in row ids, such as `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
     return ".".join(step for step in parts_of(key) if step not in ("platforms", "motion_error", "registered"))
 
 
 def report_specified(tree: Tree) -> None:
-    """Report each entry of `allocation.specify` that is not a key of an error as a fault of the tree."""
+    """Add a fault to the tree for each entry of `allocation.specify` that is not the key of an error."""
     specify = tree.root["allocation"]["specify"]
     for index, key in enumerate(specify):
         path = ("allocation", "specify", key if isinstance(specify, dict) else index)

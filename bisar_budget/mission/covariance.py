@@ -1,7 +1,7 @@
 """Position-velocity covariance of a platform's motion error: readers of its two forms in a mission file, and checks.
 
-A file has either a 6 x 6 matrix or sigmas with their correlations. A mission always holds sigmas and a correlation
-matrix. A correlation matrix has no units, so a tolerance means the same for metres and for millimetres per second.
+A mission file states either a 6 x 6 covariance matrix, or sigmas with their correlations. Both are stored as sigmas
+and a correlation matrix. A correlation matrix has no units, so a single tolerance suits positions and velocities.
 """
 
 import math
@@ -44,9 +44,9 @@ _Matrix = tuple[tuple[float, ...], ...]
 class Covariance(NamedTuple):
     """Covariance of position and velocity error along the axes of their frame.
 
-    `sigmas` (6,) are one sigma of position [m] and velocity [m/s]. `correlation` (6, 6) has a diagonal of 1 and is
-    positive semi-definite to six decimals. `is_matrix` tells whether the file has the 6 x 6 matrix. `pairs` are the
-    names of the correlated pairs as the file writes them, such as `position.x-velocity.x`.
+    `sigmas` (6,) are the 1-sigma errors of position [m] and velocity [m/s]. `correlation` (6, 6) has a diagonal of 1
+    and is positive semi-definite to six decimals. `is_matrix` is True if the file states the 6 x 6 matrix. `pairs`
+    are the names of the correlated pairs as written in the file, such as `position.x-velocity.x`.
     """
 
     sigmas: tuple[float, ...]
@@ -55,20 +55,20 @@ class Covariance(NamedTuple):
     pairs: tuple[str, ...] = ()
 
     def of(self, kind: str) -> Vector:
-        """One-sigma errors of a `kind`, "position" [m] or "velocity" [m/s], along the axes of the frame."""
+        """1-sigma errors along the axes of the frame; `kind` is "position" [m] or "velocity" [m/s]."""
         first = 3 * MOTION_KINDS.index(kind)
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
     def block(self, kind: str) -> list[tuple[float, ...]]:
-        """Correlation matrix (3, 3) of the errors along the three axes, for the `kind` "position" or "velocity"."""
+        """Correlation matrix (3, 3) of the errors along the three axes; `kind` is "position" or "velocity"."""
         first = 3 * MOTION_KINDS.index(kind)
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
-        """Path of the sigma of an axis, relative to `covariance` in the file.
+        """Key path of the 1-sigma error along an axis, relative to `covariance` in the file.
 
-        If the file has the 6 x 6 matrix, this is the path of the variance.
+        If the file states the 6 x 6 matrix, this is the path of the variance.
         """
         index = 3 * MOTION_KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
@@ -92,9 +92,10 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
 def _rows(
     value: object, readers: Sequence[Sequence[Reader[float]]], path: KeyPath, report: Report, otherwise: str
 ) -> list[tuple[float, ...]] | Invalid:
-    """Read a 6 x 6 matrix, each element with its own reader; returns six rows, or `INVALID` after a report.
+    """Read a 6 x 6 matrix with a separate reader for each element, and return its six rows.
 
-    `otherwise` describes the other form that the key accepts; the message about a wrong shape names it.
+    If the matrix is invalid, reports the faults and returns `INVALID`. `otherwise` describes the other form of value
+    that the key accepts; it is part of the error message about a wrong shape.
     """
     if not isinstance(value, list) or len(value) != MATRIX_SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
@@ -121,16 +122,16 @@ def _rows(
 
 
 def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
-    """Report faults of the value at `path`; returns whether there are any."""
+    """Report all faults of the value at `path`; returns True if there are any."""
     for fault in faults:
         report(path, fault)
     return bool(faults)
 
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
-    """Yield a problem for each element of a 6 x 6 matrix that differs from its mirror element.
+    """Yield a problem for each element of a 6 x 6 matrix that differs from the element mirrored at the diagonal.
 
-    The tolerance of an element is relative to the product of the `scales` of its row and its column.
+    The tolerance is a fraction of the product of two `scales`: the scales of the element's row and column.
     """
     for i in range(MATRIX_SIZE):
         for j in range(i):
@@ -139,7 +140,10 @@ def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> It
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
-    """Correlation matrix from a 6 x 6 matrix: its mean with its transpose, limited to ±1, with a diagonal of 1."""
+    """Make an exact correlation matrix from a rounded one: symmetric, within ±1, and with a diagonal of 1.
+
+    Each element is replaced by the mean of itself and its mirror element.
+    """
     return tuple(
         tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(MATRIX_SIZE))
         for i in range(MATRIX_SIZE)
@@ -154,10 +158,14 @@ _ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(MATRIX_SIZE)] for i in r
 
 
 class _MatrixReader(Reader[Covariance]):
-    """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
+    """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes.
+
+    The class reads such a matrix from a mission file: the covariance matrix of the position error and the velocity
+    error.
+    """
 
     def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
-        """Read the elements, and check that they form a covariance matrix."""
+        """Read the elements of a covariance matrix, and check that the matrix is a valid covariance."""
         rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
             return INVALID
@@ -209,12 +217,15 @@ class _Correlations(NamedTuple):
 
 
 class _CorrelationReader(Reader[_Correlations]):
-    """Correlations of named pairs of errors, zero for other pairs; or the 6 x 6 matrix with a diagonal of 1."""
+    """Correlations of named pairs of errors, zero for other pairs; or the 6 x 6 matrix with a diagonal of 1.
+
+    The class reads either of these two forms from a mission file.
+    """
 
     _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
 
     def read(self, value: object, path: KeyPath, report: Report) -> _Correlations | Invalid:
-        """Read the correlations of pairs, or a correlation matrix, and check that it is positive semi-definite."""
+        """Read a correlation matrix or the correlations of pairs, and check that it is positive semi-definite."""
         read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
         if read is INVALID:
             return INVALID
@@ -258,7 +269,7 @@ class _CorrelationReader(Reader[_Correlations]):
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
     def below(self, part: str) -> Reader[object] | None:
-        """Reader of the correlation of a pair such as `position.x-velocity.x`; None if the key names no pair."""
+        """Reader of the value at a key such as `position.x-velocity.x`; None if the key is not a pair of errors."""
         return self._NUMBER if "-" in part else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -274,7 +285,7 @@ class _CorrelationReader(Reader[_Correlations]):
 
 
 def error_index(name: str) -> int | None:
-    """Index, 0 to 5, of an error such as `velocity.along` in the 6 x 6 matrix; None for another name."""
+    """Index, 0 to 5, of an error such as `velocity.along` in the 6 x 6 matrix; None if there is no such error."""
     kind, _, axis = name.partition(".")
     return 3 * MOTION_KINDS.index(kind) + _AXIS[axis] if kind in MOTION_KINDS and axis in _AXIS else None
 
@@ -299,7 +310,7 @@ class Sigmas(NamedTuple):
 
 class _SigmasReader(Section[Sigmas | Covariance]):
     def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:
-        """Read a section of sigmas and correlations as a `Covariance`."""
+        """Read a section with sigmas and correlations, and return it as a `Covariance`."""
         sigmas_section = super().read(value, path, report)
         if not isinstance(sigmas_section, Sigmas):
             return INVALID

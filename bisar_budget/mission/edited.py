@@ -1,4 +1,4 @@
-"""Changes of values directly in the text of a mission file, so that all other text, including comments, is kept."""
+"""Changes of values in the text of a mission file; all other text is kept, including comments."""
 
 import json
 import os
@@ -20,9 +20,10 @@ Node = Any
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
-    """Replace values in the text of a valid mission file; each new value is written as in a mission file.
+    """Replace values in the text of a valid mission file.
 
-    Missing sections are added. A null as the new value removes the key.
+    The new values are strings as in a mission file. Missing sections are added. A null as the new value removes the
+    key.
     """
     is_of_dos = "\r\n" in text
     text = text.replace("\r\n", "\n")
@@ -37,7 +38,8 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
 def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
     """Put a section of keys and values into the text of a mission file.
 
-    The section replaces an existing section of the same name, or is added at the end. Its keys may contain dots.
+    The section replaces an existing section of the same name, or is added at the end of the file. The keys in the
+    section may contain dots.
     """
     is_of_dos, text = "\r\n" in text, text.replace("\r\n", "\n")
     root: Node = yaml.compose(text, Loader=_LOADER)
@@ -61,7 +63,7 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
 
 
 def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
-    """Yield the changes that keep the relative file names in a mission valid if its file is moved to `folder`.
+    """Yield the changes of relative file names that are necessary if the mission file is moved to `folder`.
 
     With these changes the mission names the same files as before. Absolute file names need no change.
     """
@@ -77,7 +79,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 
 
 def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield the key and the file name of each part that a mission names by its file, not by its catalogue name."""
+    """Yield the key and the file name of each part that the mission names by a file instead of a catalogue name."""
     for owner, platform in mission.platforms._asdict().items():
         for key, name in platform.part_names.items():
             if is_file(name):
@@ -85,7 +87,7 @@ def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
-    """Set the value of a key in the text of a mission file; `steps` are the keys and indices of its path."""
+    """Set the value of a key in the text of a mission file; `steps` are the keys and list indices of its path."""
     node: Node = yaml.compose(text, Loader=_LOADER)
     while True:
         key, remaining = _next(node, steps)
@@ -102,7 +104,7 @@ def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
 def _without_key(text: str, parts: tuple[str, ...]) -> str:
     """Remove a key and its value from the text of a mission file, if the key exists.
 
-    A section that then has no keys becomes empty. Comments elsewhere stay.
+    If this was the only key of its section, the section becomes empty. Comments elsewhere in the file are kept.
     """
     node: Node = yaml.compose(text, Loader=_LOADER)
     end_of_key = 0
@@ -133,7 +135,7 @@ def _without_key(text: str, parts: tuple[str, ...]) -> str:
 def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
     """Split a path into the first key or index, which belongs to `node`, and the remaining parts.
 
-    A key may contain dots.
+    A key may itself contain dots.
     """
     names: dict[str, None] | list[Node] = (
         {key.value: None for key, _ in node.value} if isinstance(node, yaml.MappingNode) else list(node.value)
@@ -143,14 +145,14 @@ def _next(node: Node, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
 
 
 def _below(node: Node, name: str) -> Node:
-    """Node of the value at a key of a mapping or at an index of a list; None if there is no such value."""
+    """Node of the value at a key of a mapping, or at an index of a list; None if there is no such value."""
     if isinstance(node, yaml.MappingNode):
         return next((value for key, value in node.value if key.value == name), None)
     return node.value[int(name)] if int(name) < len(node.value) else None
 
 
 def _end_of_key(node: Node, name: str) -> int:
-    """Character index in the text at which a key of a mapping ends; for a list, the index at which it begins."""
+    """Character index at which a key of a mapping ends; for a list, the index at which the list begins."""
     if not isinstance(node, yaml.MappingNode):
         return int(node.start_mark.index)
     return next(int(key.end_mark.index) for key, _ in node.value if key.value == name)
@@ -159,7 +161,7 @@ def _end_of_key(node: Node, name: str) -> int:
 def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
     """Replace the text of a node by `value`; comments inside a node that spans several lines are kept.
 
-    `end_of_key` is the character index at which the key of the node ends.
+    `end_of_key` is the position in `text` at which the key of the node ends.
     """
     start, end = node.start_mark.index, node.end_mark.index
     if isinstance(node, yaml.ScalarNode):
@@ -177,7 +179,7 @@ def _replaced(text: str, node: Node, value: str, end_of_key: int) -> str:
 
 
 def _without_trailing_comments(inside: str) -> str:
-    """Remove comments and blank lines from the end of a text."""
+    """Remove comments and blank lines from the end of a piece of text."""
     lines = inside.splitlines(keepends=True)
     while lines and (not lines[-1].strip() or lines[-1].lstrip().startswith("#")):
         lines.pop()
@@ -185,16 +187,16 @@ def _without_trailing_comments(inside: str) -> str:
 
 
 def _nested(parts: Sequence[str], value: str) -> str:
-    """Text of a value below nested keys, in one line: `{a: {b: 1 m}}` for the keys a and b."""
+    """Text of nested keys and a value on one line, such as `{a: {b: 1 m}}` for the keys a and b."""
     for part in reversed(parts):
         value = f"{{{part}: {value}}}"
     return value
 
 
 def _with_entry(text: str, node: Node, key: str, remaining: Sequence[str], value: str) -> str:
-    """Add a key to a mapping, or an entry to a list, in the style (one line or several) of that node.
+    """Add a key to the mapping `node`, or an entry to the list `node`, in its style: on one line or several lines.
 
-    `remaining` are keys below the new key or entry, down to the value.
+    `remaining` are the nested keys between the new key or entry and the value.
     """
     nested_value, start, end = _nested(remaining, value), node.start_mark.index, node.end_mark.index
     entry = nested_value if isinstance(node, yaml.SequenceNode) else f"{key}: {nested_value}"

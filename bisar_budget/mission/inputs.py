@@ -1,4 +1,4 @@
-"""Files that a mission reads, with their SHA-256."""
+"""Files that a mission reads, and their SHA-256 digests."""
 
 import os
 from collections.abc import Iterator
@@ -14,8 +14,8 @@ from bisar_budget.resources import resource
 class InputFile(NamedTuple):
     """A file that a mission reads.
 
-    `use` is what the mission takes from it, and `name` the name by which the mission refers to it. `path` is its
-    path on the disk; empty for a part of the catalogue of this package. `digest` is its SHA-256.
+    `use` tells for which purpose the mission reads the file, and `name` is the name in the mission. `path` is the
+    path on disk; it is empty for a part from the catalogue of this package. `digest` is the SHA-256 digest.
     """
 
     use: str
@@ -28,7 +28,11 @@ _USES_BESIDE = {"accuracy": "accuracy of the path of the {}", "earth_orientation
 
 
 def input_files(mission: Mission) -> list[InputFile]:
-    """List the files that a mission reads: the mission file, requirements, logs, orbits, their companions, parts."""
+    """List the files that a mission reads.
+
+    These are the mission file and the files of its requirements, logs, orbits and parts. Files that belong to a log
+    or an orbit, such as its accuracy, are also listed.
+    """
     return list(dict.fromkeys(_input_files(mission)))
 
 

@@ -1,6 +1,6 @@
 """Sections of a mission file with data-sheet figures: inertial sensors, position noise, oscillators, synchronisation.
 
-Values are in SI units, 1 sigma. A figure is a value that a data sheet states, such as a bias or a phase-noise mask.
+A figure is a value that a data sheet states, such as a bias or a phase-noise mask. Values are in SI units, 1 sigma.
 """
 
 import math
@@ -63,14 +63,14 @@ class Overridden(NamedTuple):
     figure : str
         Key of the replaced figure.
     key : str
-        Key, relative to the platform, that replaces the figure.
+        Key that replaces the figure, relative to the platform.
     part : str
         Name of the part or log that states the replaced figure.
     text : str
-        The replaced figure as the file of the part writes it.
+        The replaced figure as written in the file of the part.
     frequency : str
         Frequency of the part, if the mission states a phase-noise mask without a frequency. The mask then applies at
-        this frequency. Otherwise empty.
+        this frequency. Empty in all other cases.
     """
 
     figure: str
@@ -86,9 +86,9 @@ class TakenFigure(NamedTuple):
     Attributes
     ----------
     key : str
-        Path of the key under which the mission could state the figure.
+        Path of the key under which the mission could state the figure itself.
     value : str, list or mapping
-        The figure as the part's file writes it.
+        The figure as written in the file of the part.
     part : str
         Name of the part.
     """
@@ -99,7 +99,10 @@ class TakenFigure(NamedTuple):
 
 
 class Imu(NamedTuple):
-    """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
+    """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame.
+
+    Three values are given along the axes of `motion_error.frame`.
+    """
 
     accelerometer_bias: AccelerometerBias = None
     accelerometer_scale_factor: AccelerometerScaleFactor = None
@@ -111,7 +114,7 @@ class Imu(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states at least one figure of the sensor. A zero counts as stated."""
+        """Whether the file states at least one figure of the sensor; a value of zero counts as stated."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
@@ -130,8 +133,8 @@ class GaussMarkov(NamedTuple):
 class LeverArm(NamedTuple):
     """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
 
-    The axes point along the velocity, horizontally across it, and up; they turn with the velocity. The axes of a
-    fixed platform are those of the scene.
+    A lever arm has components along the velocity, horizontally across it, and up. These axes turn with the velocity.
+    The axes of a fixed platform are the axes of the scene.
     """
 
     arm: Annotated[
@@ -152,18 +155,21 @@ class LeverArm(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of a lever arm, of which at least one is required."""
+        """Keys of a lever arm; at least one of them is required."""
         return ("arm", "uncertainty")
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a lever arm with neither `arm` nor `uncertainty`."""
+        """Yield a problem for a lever arm with neither `arm` nor `uncertainty`."""
         if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:
             yield Problem("is empty", "accepted: arm, uncertainty or both")
 
 
 class PowerLaw(NamedTuple):
-    """One-sided spectrum of the fractional frequency, S_y = h₋₂/f² + h₋₁/f + h₀ + h₁·f + h₂·f². SI."""
+    """One-sided spectrum of the fractional frequency, S_y = h₋₂/f² + h₋₁/f + h₀ + h₁·f + h₂·f². SI.
+
+    The fields are the coefficients h₋₂ to h₂, in this order.
+    """
 
     random_walk: float = 0.0
     flicker: float = 0.0
@@ -177,12 +183,15 @@ _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 
 
 class _PowerLawReader(Reader[PowerLaw]):
-    """A mapping of h-2 … h2 to coefficients."""
+    """A mapping of h-2 … h2 to coefficients.
+
+    The class reads such a mapping from a mission file, and makes a `PowerLaw` from it.
+    """
 
     accepted = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
 
     def read(self, value: object, path: KeyPath, report: Report) -> PowerLaw | Invalid:
-        """Read the coefficient of each power; a problem is reported at the path of its coefficient."""
+        """Read the coefficient of each power; an invalid coefficient is reported at its own path."""
         accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
             report(path, Problem("must be a mapping of coefficients", accepted))
@@ -265,8 +274,8 @@ AccelerationSensitivity = Annotated[
 class Oscillator(NamedTuple):
     """An oscillator and its noise, in one of three forms or as a part of the catalogue.
 
-    `overridden` lists the figures of the part that keys of the file replace. `of_parts` has the sources of aging and
-    acceleration sensitivity if these figures come from the part.
+    `overridden` lists the figures of the part that are replaced by keys of the file. If aging and acceleration
+    sensitivity come from the part, `of_parts` contains their sources.
     """
 
     frequency: Frequency = None
@@ -313,7 +322,7 @@ class Oscillator(NamedTuple):
 
     @property
     def needs_frequency(self) -> bool:
-        """Whether the noise is stated for a carrier frequency, as a mask or as tones.
+        """Whether the noise is stated at a carrier frequency, that is, as a mask or as spurs.
 
         A power law describes the fractional frequency, and needs no carrier frequency.
         """
@@ -327,9 +336,9 @@ class Oscillator(NamedTuple):
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Phase noise of a part that the mission overrides by a mask without a frequency; None without such a mask.
+        """The phase noise of a part, if the mission overrides it by a mask without a frequency; otherwise None.
 
-        The mask applies at the frequency of the part.
+        The mask then applies at the frequency of the part.
         """
         return next((figure for figure in self.overridden if figure.frequency), None)
 
@@ -337,17 +346,17 @@ class Oscillator(NamedTuple):
     def noise_alone(self) -> "Oscillator":
         """Copy of the oscillator without level, aging, acceleration sensitivity and vibration.
 
-        Only its noise and its spurs remain.
+        Only the noise and the spurs remain.
         """
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
     def problems(values: SectionValues, or_else: str = _OR_SENSOR) -> Iterator[Problem]:
-        """Require exactly one form of noise, and a mask with slopes that an oscillator can have.
+        """Require exactly one form of noise, and refuse masks with slopes that no oscillator can have.
 
         A mask or spurs also need a frequency, and a vibration needs an acceleration sensitivity. A part of the
-        catalogue may supply what is missing. `or_else` is added to the message about missing noise, and names other
-        accepted keys.
+        catalogue may supply these values. `or_else` names further accepted keys; it is added to the error message
+        about missing noise.
         """
         forms = [form for form in OSCILLATOR_NOISE_FORMS if values.get(form) is not None]
         accepted = f"accepted: one of {', '.join(OSCILLATOR_NOISE_FORMS)}"
@@ -384,7 +393,11 @@ METHODS: Mapping[str, tuple[str, ...]] = {
 
 
 class Synchronization(NamedTuple):
-    """How the receiver follows the transmitter's oscillator, or how both clocks were set."""
+    """How the receiver follows the transmitter's oscillator, or how both clocks were set.
+
+    The method is an exchange of pulses, the direct path as the receiver's clock, or holdover, in which the clocks
+    were set once and then run free.
+    """
 
     error: Annotated[
         float | None,
@@ -439,12 +452,12 @@ class Synchronization(NamedTuple):
 
     @property
     def is_holdover(self) -> bool:
-        """Whether the clocks are set before the aperture, and run free during the aperture."""
+        """Whether both clocks are set before the aperture and then run free."""
         return self.method == "holdover"
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require the keys that the method of synchronisation needs, and refuse keys of other methods."""
+        """Require the keys that the method of synchronisation needs, and refuse keys that belong to other methods."""
         method = values.get("method")
         if method is None:
             return

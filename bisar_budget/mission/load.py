@@ -1,6 +1,6 @@
-"""Reader of mission files: from YAML to a plain tree with file positions (see `tree`), and on to a `Mission`.
+"""Reader of mission files: parses YAML into a tree with file positions (see `tree`), and makes a `Mission` from it.
 
-For any file, the result is either a `Mission`, or a `MissionError` with all faults and their lines.
+The result is either a `Mission`, or a `MissionError` that contains all faults of the file with their line numbers.
 """
 
 import os
@@ -31,10 +31,10 @@ _Find = Callable[[str], tuple[str, bytes]]
 def load_mission(
     path: str, model: str | None = None, changes: Sequence[SetValue] = (), *, is_placed: bool = True
 ) -> Mission:
-    """Read the mission file at `path`; `-` is standard input.
+    """Read the mission file at `path`; `-` means standard input.
 
-    `model` replaces the gating model `allocation.model` of the file, and `changes` replace other values of the file.
-    `is_placed` is the same as in `parse_mission`.
+    `model` is the model that decides the verdicts; it replaces `allocation.model` of the file. `changes` replace
+    other values of the file. `is_placed` is the same as in `parse_mission`.
 
     Raises
     ------
@@ -56,7 +56,10 @@ def load_mission(
 
 
 def _content(path: str) -> bytes:
-    """Content of a regular file or of standard input; raises `UnreadableError` for another kind of file."""
+    """Content of a regular file, or of standard input if `path` is `-`.
+
+    Raises `UnreadableError` for any other kind of file.
+    """
     if path == "-":
         return _bounded(standard_input())
     if kind := special_file(path):
@@ -68,7 +71,7 @@ def _content(path: str) -> bytes:
 def _bounded(file: BinaryIO) -> bytes:
     """Read at most `MAX_BYTES + 1` bytes of a file.
 
-    It is read in two steps, because a large buffer for a small file would cost page faults.
+    The file is read in two steps, because a large buffer would cost page faults even for a small file.
     """
     data = file.read(1 << 14)
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
@@ -89,22 +92,22 @@ def parse_mission(
     Parameters
     ----------
     data : bytes or str
-        The file's content; bytes are UTF-8.
+        Content of the file; bytes are UTF-8.
     file : str
         Name of the file for messages.
     model : str, optional
-        Gating model in place of `allocation.model`.
+        Model that decides the verdicts, in place of `allocation.model` of the file.
     read_path : callable, optional
-        Takes the name of an orbit, log or other file that the mission names, and returns its content, or raises
-        `PathFileError`. By default files are read relative to the folder of the mission file.
+        Function that takes the name of an orbit, log or other file that the mission names, and returns its content.
+        It may raise `PathFileError`. By default files are read relative to the folder of the mission file.
     changes : sequence of SetValue
-        Values that replace values of the file or are added to them, in this order.
+        Values that replace values of the file or are added to them, applied in this order.
     find : callable, optional
-        Takes the name of a part that the mission names, and returns the path and the content of its file, or raises
-        `PartError`. By default parts are searched for in the folders of `parts.folders`.
+        Function that takes the name of a part that the mission names, and returns the path and the content of its
+        file. It may raise `PartError`. By default parts are searched for in the folders of `parts.folders`.
     is_placed : bool
-        Whether platforms on the Earth get their paths. Without paths the mission has no geometry, and can be used for
-        any `collection.center_time`.
+        Whether the paths of platforms on the Earth are computed. Without these paths the mission has no geometry, and
+        can be used for any `collection.center_time`.
 
     Raises
     ------
@@ -127,7 +130,7 @@ def mission_of(
 ) -> Mission:
     """Turn the tree of a mission file into a `Mission`; the tree is changed in place.
 
-    `data` is the content of the file that the tree was read from. The other arguments and the errors are the same as
+    `data` is the content of the file from which the tree was read. The other arguments and the errors are the same as
     in `parse_mission`.
     """
     if changes:
@@ -183,7 +186,7 @@ def mission_of(
 
 
 def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
-    """Return a function that finds parts like `find`, and also stores each found part in `parts` by its name."""
+    """Return a function that calls `find`, and records each found part by its name in the mapping `parts`."""
 
     def find_and_record(name: str) -> tuple[str, bytes]:
         file, content = find(name)
@@ -202,7 +205,7 @@ def folder_of(file: str) -> str:
 
 
 def _with_hint(fault: Fault) -> Fault:
-    """Add a hint to a fault about an unknown key: the nearest known key, or the sections that have the key.
+    """Add a hint to a fault about an unknown key: the nearest known key, or the sections that have this key.
 
     Any other fault is returned unchanged.
     """
@@ -219,9 +222,9 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Add a hint to a fault of the file that names the `--set` options.
+    """Add a hint that names the `--set` options, if the fault is in the file rather than in an option.
 
-    Without these options the fault may not occur.
+    The fault may be due to these options.
     """
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
@@ -231,7 +234,10 @@ def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
 # ---------------------------------------------------------------------- files that a mission names
 @dataclass(frozen=True)
 class Named:
-    """Content of the files that a mission names, for machines without them: orbits and logs by name, and parts."""
+    """Content of the files that a mission names, for machines without them: orbits and logs by name, and parts.
+
+    `paths` has the name and the content of each orbit, log or similar file; `parts` has the files of parts.
+    """
 
     paths: tuple[tuple[str, bytes], ...] = ()
     parts: tuple[PartFile, ...] = ()
@@ -239,7 +245,7 @@ class Named:
     def parse(
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
-        """Parse a mission whose named files are all contained in this object.
+        """Parse a mission; the content of all files that it names is taken from this object.
 
         Arguments and errors are the same as in `mission_of`.
         """
@@ -248,7 +254,7 @@ class Named:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 over the names and contents of all files; empty if the mission names no files."""
+        """SHA-256 digest over the names and contents of all files; empty if the mission names no files."""
         from hashlib import sha256  # a check does not need it
 
         files = (*self.paths, *((part_file.name, part_file.data) for part_file in self.parts))
@@ -257,14 +263,15 @@ class Named:
 
 
 def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
-    """Read all files that a mission names, with its own values and with each change in `also`.
+    """Read all files that a mission names.
 
-    Each change is applied alone. A change that makes the mission invalid is skipped.
+    The result also includes the files that the mission would name with a change in `also`. Each change is applied
+    alone. A change that makes the mission invalid is skipped.
 
     Raises
     ------
     MissionError
-        A file has changed since the mission was loaded, and can no longer be used.
+        A file was changed after the mission was loaded, and can no longer be used.
     """
     from bisar_budget.mission.parts import finder_of
     from bisar_budget.mission.paths import reader_of

@@ -1,4 +1,4 @@
-"""The mission file, `schema_version` 1: all sections and keys with their types and meanings.
+"""All sections and keys of a mission file (`schema_version` 1), with their types and meanings.
 
 Values are in SI units and radians.
 """
@@ -74,7 +74,10 @@ class DocumentChange(NamedTuple):
 
 
 class Document(NamedTuple):
-    """The document that a report of this mission becomes; every report shows it."""
+    """The document that a report of this mission becomes; every report shows it.
+
+    Its fields are shown on reports: number, issue, author, applicable documents and change record.
+    """
 
     number: Annotated[str | None, Key(Text())] = None
     issue: Annotated[str | None, Key(Text())] = None
@@ -91,7 +94,7 @@ class Radar(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a lower edge of the band above 0 Hz, that is, a bandwidth below twice the centre frequency."""
+        """Require a bandwidth below twice the centre frequency, so that the lower edge of the band is above 0 Hz."""
         if (
             values.keys() >= {"bandwidth", "center_frequency"}
             and values["bandwidth"] >= 2 * values["center_frequency"]
@@ -128,7 +131,7 @@ class Scene(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require either all three coordinates of the scene centre on the Earth, or none."""
+        """Refuse a scene whose centre on the Earth lacks one or two of its three coordinates."""
         if values.keys() >= set(PLACE_KEYS):
             missing = [key for key in PLACE_KEYS if values[key] is None]
             if 0 < len(missing) < len(PLACE_KEYS):
@@ -141,7 +144,7 @@ class Scene(NamedTuple):
 
     @property
     def axes(self) -> SceneAxes | None:
-        """East, north and up of the scene in Earth-fixed axes; None if the scene has no position on the Earth."""
+        """Directions east, north and up of the scene in Earth-fixed axes; None if the scene is not on the Earth."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
@@ -167,7 +170,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require either a table, or UT1 - UTC, optionally with both coordinates of the polar motion."""
+        """Require either the name of a table, or UT1 - UTC, optionally with both coordinates of the polar motion."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -179,9 +182,9 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """Orientation of the Earth from the stated values.
+        """Orientation of the Earth, made from the values in the file.
 
-        If the file states no polar motion, the pole is at (0, 0), and has its usual uncertainty.
+        If the file does not state the polar motion, the pole is at (0, 0) and has the default uncertainty.
         """
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
@@ -200,7 +203,10 @@ class TimingError(NamedTuple):
 
 
 class OtherError(NamedTuple):
-    """An error from elsewhere, stated by its effects on the image; at least one effect."""
+    """An error from elsewhere, stated by its effects on the image; at least one effect.
+
+    The causes of such an error are not modelled; the mission file states its effects.
+    """
 
     name: Annotated[str, Key(Text(), "Becomes the row ids other.NAME, other.NAME.cubic_phase_error and so on.")]
     quadratic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
@@ -211,18 +217,18 @@ class OtherError(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of the effects, of which at least one is required."""
+        """Keys of the effects; at least one of them is required."""
         return OTHER_EFFECTS
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require at least one effect."""
+        """Require that the error states at least one effect."""
         if values.keys() >= set(OTHER_EFFECTS) and all(values[effect] is None for effect in OTHER_EFFECTS):
             yield Problem("states no effect", f"accepted: any of {', '.join(OTHER_EFFECTS)}")
 
     @property
     def stated(self) -> dict[str, float]:
-        """Map the row id of each stated effect to its size: phases [rad], location error [m], ISLR [dB]."""
+        """Sizes of the stated effects by row id: phases [rad], location error [m], ISLR [dB]."""
         first, *further = OTHER_EFFECTS
         sizes = {f"other.{self.name}": getattr(self, first)}
         sizes |= {f"other.{self.name}.{effect}": getattr(self, effect) for effect in further}
@@ -282,20 +288,24 @@ class Requirements(NamedTuple):
 
 
 def id_of_requirement(key: str) -> str:
-    """Id of the requirement with a given key, such as `requirement.islr`, for lists that also contain rows."""
+    """Id of the requirement with a given key, such as `requirement.islr`, as used in lists of row ids."""
     return f"requirement.{key}"
 
 
 def least_age(averaging: PerCase, aperture_time: PerCase) -> PerCase:
-    """Smallest age of a clock setting for which its averaging time does not overlap with the aperture. [s]"""
+    """Smallest age of a clock setting at which its averaging time does not overlap with the aperture. [s]
+
+    The age is the time from the middle of the averaging to mid-aperture.
+    """
     return (averaging + aperture_time) / 2
 
 
 def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
-    """Yield problems of a synchronisation without a direct path.
+    """Yield the problems of a method of synchronisation other than the direct path.
 
-    One problem is a holdover whose averaging time overlaps with the aperture. The other is a clock error that is
-    stated in both `timing_error` and `synchronization`.
+    There is a problem if the averaging time of a holdover overlaps with the aperture. In a holdover, the clocks are
+    set once and then run free. There is also a problem if both `timing_error` and `synchronization` state a clock
+    error.
     """
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
     if sync is None or sync.is_direct_path:
@@ -326,7 +336,7 @@ def _unset_clocks(values: SectionValues) -> Iterator[Problem]:
 
 
 def least_bandwidth(aperture_time: PerCase) -> PerCase:
-    """Smallest useful bandwidth of an oscillator's noise: one cycle per aperture, 1/T. [Hz]
+    """Smallest useful noise bandwidth of an oscillator: one cycle per aperture, 1/T. [Hz]
 
     A smaller bandwidth would exclude all noise that changes within the aperture.
     """
@@ -370,7 +380,11 @@ SHARE_SUM_TOLERANCE_FRACTION = 1e-6  # largest difference of a sum of shares fro
 
 
 class Shares(NamedTuple):
-    """Parts of one budget; they sum to 1."""
+    """Parts of one budget; they sum to 1.
+
+    A share is assigned to each owner of errors: transmitter, receiver, and optionally the clock. The reserve is not
+    assigned.
+    """
 
     transmitter: Annotated[float, Key(SHARE)]
     receiver: Annotated[float, Key(SHARE)]
@@ -378,9 +392,10 @@ class Shares(NamedTuple):
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
-        """Share of an owner, such as `receiver`; 1 for `mission`, to which errors without an owner are assigned.
+        """Share of the budget that is assigned to an owner, such as `receiver`.
 
-        A clock without a share of its own has the receiver's share.
+        The share of `mission`, to which errors without an owner are assigned, is 1. A clock without its own share has
+        the share of the receiver.
         """
         if owner == "clock":
             return self.receiver if self.clock is None else self.clock
@@ -389,16 +404,16 @@ class Shares(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether the errors of `owner` count against the share of the owner `of`.
+        """Whether the errors that `owner` causes count against the share of the owner `of`.
 
-        All errors count if `of` is `mission`. The clock's errors count against the receiver's share if the clock has
-        no share of its own.
+        All errors count if `of` is `mission`. The errors of the clock count against the receiver's share if the clock
+        has no share of its own.
         """
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require shares, including the reserve, that sum to 1."""
+        """Require that the shares, including the reserve, sum to 1."""
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
@@ -412,7 +427,11 @@ SPLIT = either(dict, SHARES, RULE)
 
 
 class MetricSplits(NamedTuple):
-    """A split of its own for each metric."""
+    """A split of its own for each metric.
+
+    A split divides the budget of a metric, such as the ISLR, among the owners of errors. It is the name of a rule, or
+    a set of shares.
+    """
 
     quadratic_phase_error: Annotated[str | Shares, Key(SPLIT)] = "equal"
     pslr: Annotated[str | Shares, Key(SPLIT)] = "equal"
@@ -423,14 +442,17 @@ METRIC_SPLITS = Section(MetricSplits)
 
 
 def _form_of_split(value: object) -> Reader[str | Shares | MetricSplits]:
-    """Reader for a value of `allocation.split`: the name of a rule, shares, or a split for each metric."""
+    """Return the reader for a value of `allocation.split`: the name of a rule, shares, or a split for each metric."""
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
 
 
 class AllocationRules(NamedTuple):
-    """How the budget is divided and which model gates."""
+    """How the budget is divided and which model gates.
+
+    The results of the gating model, which is chosen by `model`, decide whether rows pass.
+    """
 
     split: Annotated[
         str | Shares | MetricSplits,
@@ -473,7 +495,10 @@ class AllocationRules(NamedTuple):
 
 
 class Autofocus(NamedTuple):
-    """Autofocus: the algorithm, and how far it can correct."""
+    """Autofocus: the algorithm, and how far it can correct.
+
+    `n_pull` is the pull-in range: autofocus corrects phase errors of up to n_pull·π rad.
+    """
 
     algorithm: Annotated[str, Key(Choice("pga", "map_drift"))] = "pga"
     n_pull: Annotated[
@@ -520,7 +545,7 @@ class Mission(NamedTuple):
     file : str
         Path of the file.
     places : mapping of KeyPath to event
-        The YAML parser's event of each value, which has its position in the file.
+        The YAML parser's event for each value, which contains the position of the value in the file.
     data : bytes
         Content of the file, byte for byte.
     changes : tuple of SetValue
@@ -589,11 +614,15 @@ class Mission(NamedTuple):
     taken: tuple[TakenFigure, ...] = ()
 
     def __repr__(self) -> str:
-        """One line of text with the path of the file and the name of the mission."""
+        """Text on one line with the path of the file and the name of the mission."""
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
-        """HTML table for a notebook: radar, aperture, place and motion of each platform, bistatic angle, rules."""
+        """HTML table for a notebook.
+
+        The table shows the centre frequency, the bandwidth and the aperture time; the range, the elevation and the
+        speed of each platform; the bistatic angle; the model; and the rule by which errors are combined.
+        """
         from html import escape  # a check does not need it
 
         from bisar_budget import notebook
@@ -617,21 +646,21 @@ class Mission(NamedTuple):
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
 
     def __ne__(self, other: object) -> bool:
-        """Whether two missions differ; without this method, Python would compare them as tuples."""
+        """Whether two missions differ. Without this method, Python would compare them as tuples."""
         return not self == other
 
     def replace(self, values: Mapping[str, object]) -> "Mission":
-        """Return a mission with some values changed; the argument is the same as in `quantities.changed`."""
+        """Return a mission in which some values are changed; `values` is the same as in `quantities.changed`."""
         from bisar_budget.mission.quantities import changed  # that module imports this one
 
         return changed(self, values)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require consistent sections.
+        """Require sections that fit together.
 
-        Paths and collection have to form an image, and the settings of clocks and oscillators have to fit the
-        aperture. No name and no row id may occur twice in `other_errors`.
+        The paths and the collection must be able to form an image, and the settings of clocks and oscillators must
+        suit the aperture. No name and no row id may occur twice in `other_errors`.
         """
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
@@ -661,7 +690,7 @@ class Mission(NamedTuple):
 
     @property
     def geometry(self) -> BistaticGeometry:
-        """Paths of transmitter and receiver in the frame of the scene."""
+        """Paths of transmitter and receiver in the axes of the scene."""
         return self.platforms.geometry
 
     @property
@@ -680,20 +709,21 @@ class Mission(NamedTuple):
     def line(self, path: KeyPath) -> Place | None:
         """Line number of a value in the mission file, starting at 1, and the region that the value occupies.
 
-        If the file does not have the value, the nearest key above it is used, or else the first key of the file. The
-        result is None for a mission without a file, and for a value that an option set.
+        If the file does not contain the value, the line and the region are those of the nearest section above it, or
+        else of the first key of the file. The result is None for a mission without a file, and for a value that an
+        option has set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
-        """Whether an option has set the value at a path, or a section or list that contains it."""
+        """Whether an option has set the value at `path`, or a section or list that contains it."""
         event = next(filter(None, map(self.places.get, upwards(path))), None)
         return bool(self.changes) and isinstance(event, Changed)
 
 
 def _at_a_glance(state: PlatformState) -> str:
-    """One line of text with a platform's slant range, elevation and speed."""
+    """Text on one line with the slant range, the elevation and the speed of a platform."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
     slant_range = format_quantity(float(state.slant_range), "m", 4)
@@ -701,9 +731,9 @@ def _at_a_glance(state: PlatformState) -> str:
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission states sensors, lever arms, clocks, vibration spectra or raw logs.
+    """Whether a mission states sensors, lever arms, clocks, vibration spectra or flight logs that are not smoothed.
 
-    Their errors vary randomly over an aperture.
+    The errors that they cause vary randomly over an aperture.
     """
     return (
         mission.synchronization is not None
@@ -722,9 +752,10 @@ def has_instruments(mission: Mission) -> bool:
 
 
 def has_random_errors(mission: Mission) -> bool:
-    """Whether a mission has errors that vary randomly, or effects other than a quadratic phase.
+    """Whether a mission has errors that vary randomly, or effects other than a quadratic phase error.
 
-    These are the errors of `has_instruments`, propagation delays, and other effects in `other_errors`.
+    These are the errors of `has_instruments`, propagation delays, and any effect in `other_errors` other than the
+    quadratic phase error.
     """
     return (
         has_instruments(mission)
@@ -736,8 +767,8 @@ def has_random_errors(mission: Mission) -> bool:
 def flies_on_earth(mission: Mission) -> bool:
     """Whether a mission needs positions on the Earth.
 
-    It does if its scene has such a position, if a path needs one or comes from a file, or if errors are in `ric`
-    axes.
+    This is the case if the scene has a position on the Earth, if a path needs such a position or comes from a file,
+    or if errors are stated in the `ric` frame.
     """
     common = mission.common_motion_error
     return (
@@ -753,7 +784,7 @@ def names_parts(mission: Mission) -> bool:
 
 
 def names_requirements(root: Mapping[str, object]) -> bool:
-    """Whether the content of a mission file, valid or not, names a requirements file."""
+    """Whether the content of a mission file names a requirements file; the content may be invalid."""
     requirements = root.get("requirements")
     return isinstance(requirements, dict) and "file" in requirements
 
@@ -762,7 +793,10 @@ _KEYS_OF_PARTS = ("sensor", "navigation")  # keys of a section that name parts o
 
 
 def names_files(root: Mapping[str, object]) -> bool:
-    """Whether the content of a mission file, valid or not, names a part, an orbit, a log or a requirements file."""
+    """Whether the content of a mission file names a part, an orbit, a log or a requirements file.
+
+    The content may be invalid.
+    """
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return names_requirements(root) or any(
@@ -781,7 +815,8 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 def mission_schema() -> JsonObject:
     """JSON Schema of a mission file.
 
-    A quantity is a bare number, or a string with a unit. The schema does not check units completely; the tool does.
+    A quantity is a bare number, or a string with a unit. The schema checks units only in part; the reader of mission
+    files checks them completely.
     """
     definitions: Definitions = {}
     return {

@@ -1,8 +1,8 @@
 """Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and sources.
 
-A figure is a value from a data sheet, such as a bias or a phase-noise mask. Each part has one YAML file. The file is
-in `specs/sensors/`, in a folder that the settings of a project name, or anywhere if the mission names its path. A
-mission names parts. A figure that the mission states itself overrides the figure of the part.
+A figure is a value from a data sheet, such as a bias or a phase-noise mask. Each part has a YAML file. The file is in
+`specs/sensors/`, or in a folder that is named in the settings of a project, or anywhere if the mission names its
+path. A mission refers to a part by name. If the mission itself states a figure, it overrides the figure of the part.
 """
 
 import os
@@ -135,7 +135,7 @@ class GnssPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require at least one figure that is not zero, and distinct names of the position errors in `random`."""
+        """Require at least one figure that is not zero; names in `random` must be distinct."""
         yield from MotionError.problems({"random": values.get("random", ())})
         yield from _without_figure(values, _GNSS_KINDS)
 
@@ -156,7 +156,7 @@ class OscillatorPart(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Check the figures as those of an oscillator in a mission, and require noise that is not zero."""
+        """Check the figures as for an oscillator in a mission file, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
         if any(values.get(form) is not None for form in OSCILLATOR_NOISE_FORMS):
             yield from _without_figure(values, OSCILLATOR_NOISE_FORMS)
@@ -193,12 +193,12 @@ class PartError(Exception):
         return cls(*MissionError(file, tuple(faults)).lines(), faults=faults)
 
     def __str__(self) -> str:
-        """All reasons in one line, joined by semicolons."""
+        """All reasons on one line, joined by semicolons."""
         return "; ".join(map(str, self.args))
 
 
 def evidence(part: Part, figure: str) -> str:
-    """Evidence for a figure of a part, as reports show it: the name of the part, and the source of the figure."""
+    """Evidence for a figure of a part as shown in reports: the name of the part, and the source of the figure."""
     source = part.source if isinstance(part.source, str) else part.source.get(figure, "")
     return f"{part.name}: {source}"
 
@@ -213,17 +213,17 @@ class Entry:
 
     @property
     def id(self) -> str:
-        """Name by which a mission names the part: its file name without folder and suffix."""
+        """Name by which a mission refers to the part: the name of its file without folder and suffix."""
         return os.path.splitext(os.path.basename(self.file))[0]
 
     @property
     def figures(self) -> Mapping[str, str]:
-        """Map the key of each figure of the part to the figure as written in the file, on one line."""
+        """Figures of the part by key, each as written in the file, on one line."""
         return {key: figure_text(self.written[key]) for key in FIGURES[self.part.kind] if key in self.written}
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
-    """Yield all parts in the folders `places` of the catalogue, sorted by kind and name.
+    """Yield all parts in the catalogue folders `places`, sorted by kind and name.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def entries(places: Sequence[str]) -> Iterator[Entry]:
 
 
 def figure_text(value: object) -> str:
-    """Write a figure of a part, which may be a list or a mapping, as one line of text."""
+    """Write a figure of a part on one line of text; the figure may be a list or a mapping."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
@@ -244,9 +244,10 @@ def figure_text(value: object) -> str:
 
 
 def read_entry(file: str) -> Entry:
-    """Read the file of a part, and check it and the file name as for a mission that names the part.
+    """Read the file of a part, and check the content and the file name.
 
-    `-` is standard input, whose name is not checked.
+    The checks are the same as for a part that a mission names. If `file` is `-`, standard input is read, and there is
+    no file name to check.
 
     Raises
     ------
@@ -265,7 +266,7 @@ def read_entry(file: str) -> Entry:
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
-    """Yield a fault if no mission can refer to a part by the name of its file."""
+    """Yield a fault for each reason why no mission can refer to a part by the name of this file."""
     name = os.path.basename(file)
     if not name.endswith(_SUFFIXES):
         accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
@@ -277,7 +278,7 @@ def _name_faults(file: str) -> Iterator[Fault]:
 
 
 def _content(file: str, files: Files) -> bytes:
-    """Content of the file of a part; raises `PartError` if it cannot be read."""
+    """Content of a part's file; raises `PartError` if the file cannot be read."""
     try:
         return files.content(file, MAX_BYTES)
     except UnreadableError as error:
@@ -286,7 +287,7 @@ def _content(file: str, files: Files) -> bytes:
 
 
 def _standard_input() -> bytes:
-    """Content of standard input, at most `MAX_BYTES + 1` bytes; raises `PartError` if it cannot be read."""
+    """At most `MAX_BYTES + 1` bytes of standard input; raises `PartError` if it cannot be read."""
     try:
         return standard_input().read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
@@ -296,7 +297,7 @@ def _standard_input() -> bytes:
 
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
-    """Read a part from the content of its file, or take it from the cache; raises `PartError` for an invalid part."""
+    """Read a part from the content of its file, or take it from the cache; raises `PartError` if it is invalid."""
     part: Part | Invalid = INVALID
     try:
         tree = read_tree(data, file, "part")
@@ -312,8 +313,9 @@ def _entry(file: str, data: bytes) -> Entry:
 def _part_of(tree: Tree) -> Part | Invalid:
     """Read the part from the tree of its file.
 
-    Faults are reported to the tree, and the result is `INVALID` if the part cannot be used. If the file has no valid
-    kind, the part is read as the kind to which most of its figures belong, so that all faults are reported at once.
+    If the part cannot be used, the faults are added to the tree, and the result is `INVALID`. If the file states no
+    valid kind of part, the part is read as the kind to which most of its figures belong, so that all faults are
+    reported at once.
     """
     root = tree.root
     kind = root.get("kind")
@@ -331,9 +333,9 @@ def _part_of(tree: Tree) -> Part | Invalid:
 
 
 def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
-    """Problem of a part whose kind is missing or unknown.
+    """Describe the problem of a part whose kind is missing or unknown.
 
-    `likely` is the kind to which its figures belong; empty if they belong to none.
+    `likely` is the kind to which its figures belong; it is empty if they belong to no kind.
     """
     hint = did_you_mean(root.get("kind", ""), tuple(PART_SECTIONS))
     if likely:
@@ -347,17 +349,17 @@ def _no_kind(root: Mapping[str, object], likely: str) -> Problem:
 def _without_figure(values: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
     """Yield a problem if all figures of a part are missing or zero.
 
-    `values` has no entry for an invalid figure. No problem is reported in this case, because the invalid figure is
-    reported elsewhere.
+    `values` has no entry for an invalid figure. If there is an invalid figure, no problem is yielded here, because it
+    is reported elsewhere.
     """
     if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
 def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Iterator[Problem]:
-    """Yield a problem if a part's `source` is a mapping by figure that lacks some of the stated figures.
+    """Yield a problem if `source` is a mapping of figures to sources, but lacks some of the stated figures.
 
-    Invalid figures need a source too. `root` is the content of the file.
+    Invalid figures also need a source. `root` is the content of the part's file.
     """
     source = root.get("source")
     if not isinstance(source, dict):
@@ -372,7 +374,7 @@ def _without_source(root: Mapping[str, object], figures: Sequence[str]) -> Itera
 
 
 def _is_not_zero(figure: object) -> bool:
-    """Whether a figure is stated and any of its numbers is not zero.
+    """Whether a figure is stated and at least one of its numbers is not zero.
 
     A part needs such a figure, because every sensor has errors.
     """
@@ -384,9 +386,9 @@ def _is_not_zero(figure: object) -> bool:
 
 
 def folders(beside: str, files: Files = DISK) -> list[str]:
-    """Folders in which to search for parts: the folders in the project settings, then the catalogue of this package.
+    """Folders in which parts are searched for: the folders in the project settings, then the package's catalogue.
 
-    The project is found from the folder `beside`; an empty string means the current folder.
+    The settings belong to the project that contains the folder `beside`; an empty string means the current folder.
 
     Raises
     ------
@@ -404,9 +406,9 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """Map the name of each part in the folders `places` to its file.
+    """Files of all parts in the folders `places`, by the name of the part.
 
-    If several folders have a part of the same name, the first folder takes precedence.
+    If several folders have a part of the same name, the first of these folders takes precedence.
     """
     part_file_by_name: dict[str, str] = {}
     for folder in places:
@@ -426,10 +428,10 @@ def part_files(folder: str, files: Files = DISK) -> list[str]:
 
 
 def finder_of(folder: str, files: Files = DISK) -> Find:
-    """Return a function that takes the name of a part in a mission, and returns the path and the content of its file.
+    """Return a function that finds parts: it takes the name of a part, and returns the path and content of its file.
 
-    `folder` is the folder of the mission file. The function raises `PartError` if no part has the name, or if its
-    file cannot be read.
+    `folder` is the folder of the mission file. The function raises `PartError` if there is no part with this name, or
+    if its file cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
@@ -440,25 +442,25 @@ def finder_of(folder: str, files: Files = DISK) -> Find:
 
 
 def find_part(name: str, beside: str) -> Part:
-    """Read the part that a mission in the folder `beside` names.
+    """Read a part by the name that a mission in the folder `beside` uses for it.
 
-    `name` is the name of a part of the catalogue, or the path of a file relative to that folder.
+    `name` is a name in the catalogue, or the path of a file relative to that folder.
 
     Raises
     ------
     PartError
-        No part has the name, or the file is not a valid part.
+        There is no part with this name, or its file is not a valid part.
     """
     return _entry(*finder_of(beside)(name)).part
 
 
 def is_file(name: str) -> bool:
-    """Whether the name of a part in a mission is the path of a file; otherwise it is a name in the catalogue."""
+    """Whether a mission names a part by the path of a file; otherwise `name` is a name in the catalogue."""
     return name.endswith(_SUFFIXES)
 
 
 def _file_of(name: str, beside: str, files: Files) -> str:
-    """Path of the file of a part that a mission names; raises `PartError` if no folder has the part.
+    """Path of the file of a part that a mission names; raises `PartError` if no folder contains the part.
 
     `beside` is the folder of the mission.
     """
@@ -476,9 +478,9 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invalid:
-    """Return a mission completed with the figures of the parts that it names; `INVALID` if a problem is reported.
+    """Return the mission completed with figures of the parts that it names; `INVALID` if a problem was reported.
 
-    `find` finds the file of a part, and may raise `PartError`.
+    `find` returns the path and content of a part's file, and may raise `PartError`.
     """
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
@@ -496,10 +498,10 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Mission | Invali
 
 
 def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None:
-    """Report problems of the parts that a mission file names, if the file itself is invalid.
+    """Report problems of the parts that an otherwise invalid mission file names.
 
-    A valid section is checked together with its parts as in a mission. For an invalid section, only the names of its
-    parts are checked. `root` is the content of the file.
+    A valid section is checked together with its parts, as in a valid mission. For an invalid section, only the names
+    of its parts are checked. `root` is the content of the mission file.
     """
     platforms = root.get("platforms")
     for name in Platforms._fields:
@@ -514,9 +516,9 @@ def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None
 
 
 def _stand_in(section: Section[object], value: object) -> SectionValues:
-    """Select the values of a section that are used to check the parts that it names.
+    """Select the values of a section that are needed to check the parts that the section names.
 
-    These are all values of the section if they are valid, and otherwise only the names of the parts.
+    If all values of the section are valid, all are selected; otherwise only the names of the parts.
     """
     values = section.each(value)
     if INVALID not in values.values():
@@ -529,7 +531,7 @@ def _parts_of(
 ) -> dict[str, Entry] | Invalid:
     """Find and read the parts that the key at `path` names, at most one of each kind in `kinds`.
 
-    Returns their entries by name, or `INVALID` if a problem is reported.
+    Returns a mapping of part names to entries, or `INVALID` if a problem was reported.
     """
     is_list = isinstance(names, tuple)
     entry_by_name: dict[str, Entry] = {}
@@ -558,10 +560,10 @@ def _parts_of(
 def _with_sensors(
     error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> MotionError | Invalid:
-    """Complete a motion error with the figures of the parts that it names; `INVALID` if a problem is reported.
+    """Complete a motion error with the figures of the parts that it names; `INVALID` if a problem was reported.
 
-    Figures that come from parts are appended to `taken`. If the file states a figure that a part also states, the
-    figure of the file is kept, and the motion error lists the part's figure as overridden.
+    Figures that come from parts are appended to `taken`. If both the file and a part state a figure, the figure of
+    the file is kept, and the figure of the part is added to `overridden` of the motion error.
     """
     if error.navigation is not None:
         navigation = _with_aiding_parts(error.navigation, (*path, "navigation"), find, report, taken)
@@ -645,18 +647,20 @@ def _with_aiding_parts(
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:
-    """Yield the figures in `figures` that a section takes from a part, in the order of the part's file."""
+    """Yield a `TakenFigure` for each figure in `figures`, in the order of the part's file.
+
+    These are the figures that the section at the path `section` takes from the part with the name `name`.
+    """
     for figure in entry.figures:
         if figure in figures:
             yield TakenFigure(".".join(map(str, (*section, figure))), entry.written[figure], name)
 
 
 def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str:
-    """Key under which the mission itself states a figure of a part; empty if only the part states it.
+    """Key under which the mission itself states a figure of a part; empty if only the part states the figure.
 
-    The key is relative to the platform.
-
-    `stating` is the section in which the mission could state the figure: the motion error itself, or its `imu`.
+    The key is relative to the platform. `stating` is the section in which the mission could state the figure: the
+    motion error itself, or its `imu`.
     """
     if figure in ("position", "velocity"):
         if error.covariance is not None:
@@ -671,10 +675,10 @@ def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str
 def _with_sensor(
     oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]
 ) -> Oscillator | Invalid:
-    """Complete an oscillator with the figures of the part that it names; `INVALID` if a problem is reported.
+    """Complete an oscillator with the figures of the part that it names; `INVALID` if a problem was reported.
 
-    Figures that come from the part are appended to `taken`. If the file states a figure that the part also states,
-    the figure of the file is kept, and the oscillator lists the part's figure as overridden. A phase-noise mask is
+    Figures that come from the part are appended to `taken`. If both the file and the part state a figure, the figure
+    of the file is kept, and the figure of the part is added to `overridden` of the oscillator. A phase-noise mask is
     valid only at the frequency at which it was measured. At another frequency, the same decibels would describe a
     better or a worse oscillator. If the noise of the part is a mask, a file that states another frequency must
     therefore also state the noise.
@@ -756,8 +760,9 @@ def part_schema() -> JsonObject:
 def _rules(figures: Sequence[str]) -> JsonObject:
     """Rules of the JSON Schema for the figures of a part.
 
-    At least one figure is stated. If sources are stated by figure, each figure has one. An oscillator has exactly one
-    form of noise, and a mask has its frequency. The rules cannot detect figures that are zero; the reader does.
+    At least one figure is required. If `source` is a mapping of figures to sources, it contains every stated figure.
+    An oscillator has exactly one form of noise, and a mask needs a frequency. The schema cannot reject figures that
+    are zero, but the reader of parts rejects them.
     """
     by_itself = [figure for figure in figures if figure not in ("frequency", *BESIDE_NOISE)]
     alternatives = [{"required": [figure], "properties": {figure: _NOT_EMPTY}} for figure in by_itself]

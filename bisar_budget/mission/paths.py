@@ -1,4 +1,4 @@
-"""Paths of a mission's platforms over the aperture: from an orbit, a flight log, or a geodetic position."""
+"""Paths of a mission's platforms over the aperture, from an orbit, a flight log, or a geodetic position."""
 
 import hashlib
 import math
@@ -96,7 +96,7 @@ class _UnusablePathError(Exception):
 
 
 def reader_of(folder: str, files: Files = DISK) -> Beside:
-    """Return a function that reads a file by its name relative to a folder, and returns its content.
+    """Return a function that takes the name of a file relative to `folder`, and returns its content.
 
     The function raises `PathFileError` if a file cannot be read, is not a regular file, or is larger than 500 MB.
     """
@@ -114,7 +114,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Yield the key and the name of each file that a mission names, except for files of parts."""
+    """Yield the key and the file name of each file that a mission names, except for files of parts."""
     for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILE_KEYS:
@@ -127,10 +127,10 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def report_files(root: Mapping[str, object], read: Beside, report: Report) -> None:
-    """Report orbits, logs and orientation tables that cannot be read, for an otherwise invalid mission file.
+    """Report orbits, logs and orientation tables that an otherwise invalid mission names but that cannot be read.
 
-    Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
-    `root` is the content of the mission file.
+    Their content is not checked, because a path depends on the scene, time and aperture of a valid mission. `root` is
+    the content of the mission file.
     """
     platforms, orientation = root.get("platforms"), root.get("earth_orientation")
     files: dict[KeyPath, object] = {}
@@ -149,7 +149,7 @@ def report_files(root: Mapping[str, object], read: Beside, report: Report) -> No
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Invalid:
-    """Return a mission with the paths of its platforms, or `INVALID` after a report.
+    """Return a mission with the paths of its platforms; if a path is unusable, report it and return `INVALID`.
 
     `read` returns the content of a file, and may raise `PathFileError`.
     """
@@ -182,7 +182,7 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Mission | Inva
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
-    """Problem of the Earth-orientation file that a mission names; None if the file is usable or not named.
+    """Problem with the Earth-orientation file that a mission names; None if it is usable, or if no file is named.
 
     The file is checked even if no path needs it.
     """
@@ -199,7 +199,7 @@ def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
 
 
 def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
-    """Return a platform with its path, and with the errors that the source of the path states.
+    """Return a platform with its path; errors that the source of the path states are added to its motion error.
 
     Raises `_UnusablePathError` if there is no usable path.
     """
@@ -233,9 +233,9 @@ def _flight_of(mission: Mission, platform: Platform) -> tuple[float, float] | No
 
 
 def _file_problem(file: str | None, error: PathFileError) -> Problem:
-    """Problem of a path file from the error of its reader; the text of the problem names the file exactly once.
+    """Convert an error of a file's reader to a problem of the mission; the text names the file exactly once.
 
-    `file` is the name that a key of the mission states; None if the problem belongs to another key.
+    `file` is the file name at the key with the problem; None if the key does not name the file.
     """
     words = str(error)
     words = f"{file} {words}" if file is not None and words.startswith("has ") else words
@@ -243,16 +243,17 @@ def _file_problem(file: str | None, error: PathFileError) -> Problem:
 
 
 def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
-    """Axes of a scene; raises `_UnusablePathError` for `key` if the scene has no position on the Earth."""
+    """Return the axes of the scene; raises `_UnusablePathError` for `key` if the scene is not on the Earth."""
     if axes is None:
         raise _UnusablePathError((key,), Problem("needs the scene's position on the Earth", _ACCEPTED_SCENE))
     return axes
 
 
 def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
-    """Add the axes of the `ric` frame (radial, in-track, cross-track) to a path, for a scene on the Earth.
+    """Add the axes of the `ric` frame (radial, in-track, cross-track) to the path of a platform.
 
-    The path is returned unchanged if these axes are undefined, that is, if the inertial velocity is zero.
+    `axes` are the axes of a scene on the Earth. The path is returned unchanged if the `ric` axes are undefined, that
+    is, if the inertial velocity is zero.
     """
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
@@ -261,7 +262,7 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 
 
 def with_dynamics(state: PlatformState, axes: earth.SceneAxes | None, *, is_orbit: bool = False) -> PlatformState:
-    """Add the dynamics of state errors in free fall to a path that is an orbit or is itself in free fall.
+    """Add the dynamics of errors in free fall to the path of a platform that is in orbit or falls freely.
 
     Any other path gets no such dynamics.
     """
@@ -274,15 +275,15 @@ class _OrbitFile(NamedTuple):
     Attributes
     ----------
     form : str
-        Key of the format, one of `ORBIT_FORMATS`.
+        Key of the file's format, one of `ORBIT_FORMATS`.
     name : str, optional
-        Name of the file; None for an element set in the mission file.
+        Name of the file; None if the mission file itself contains the element set.
     data : bytes
-        Content.
+        Content of the file, or of the element set.
     object : str, optional
-        Name or number of the object, if the file has several.
+        Name or number of the object, which is needed if the file has several objects.
     is_planned : bool
-        Whether the orbit is planned. It then has no uncertainty from its age and interpolation.
+        Whether the orbit is only planned. Age and interpolation then do not make it uncertain.
     """
 
     form: str
@@ -293,7 +294,7 @@ class _OrbitFile(NamedTuple):
 
     @classmethod
     def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
-        """Read the file of an orbit, or its element set in the mission file; raises `PathFileError`."""
+        """Read the file of an orbit, or the element set in the mission file; raises `PathFileError`."""
         form = _form_of(route)
         source = getattr(route, form)
         if isinstance(source, str):
@@ -301,7 +302,7 @@ class _OrbitFile(NamedTuple):
         return cls(form, None, "\n".join(source).encode(), route.object, bool(route.planned))
 
     def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
-        """Orbit at the instant `center`; raises `PathFileError` if the file has no orbit at that time."""
+        """Read the orbit for the instant `center`; raises `PathFileError` if the file does not cover this instant."""
         name = self.name or "the element set"
         hold_to_format(self.data, name, self.form)
         orbit = ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
@@ -309,16 +310,16 @@ class _OrbitFile(NamedTuple):
 
 
 def _form_of(route: OrbitSource) -> str:
-    """Key of the orbit format that the mission file uses, such as `tle`."""
+    """Key of the format in which the mission states the orbit, such as `tle`."""
     return next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
 
 
 def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
-    """Return a function that takes an instant of mid-aperture, and returns the orbit of a mission at that instant.
+    """Return a function that takes the time of mid-aperture, and returns the orbit of a mission for this time.
 
-    If a file has several element sets or segments, the one nearest to the instant is used. Both functions may raise
-    `PathFileError`. The orientation of the Earth is taken at noon of the day, because UT1 - UTC changes by only a
-    millisecond per day.
+    If a file has several element sets or segments, the set or segment nearest to that time is used. `orbits_of`
+    itself and the returned function may raise `PathFileError`. The orientation of the Earth is taken at noon of the
+    day, because UT1 - UTC changes by only a millisecond per day.
     """
     orbit_file = _OrbitFile.of(route, read)
 
@@ -330,7 +331,7 @@ def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[I
 
 
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
-    """Path of a platform over the aperture from the orbit that the mission names."""
+    """Path of a platform over the aperture, computed from the orbit that the mission names."""
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
@@ -369,9 +370,9 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
 
 
 def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], make: Callable[[], _T]) -> _T:
-    """Value of `key` in a cache; a missing value is computed by `make` and stored.
+    """Return the value of `key` from a cache; a missing value is computed with `make` and stored.
 
-    The cache keeps the `most` most recently used values.
+    The cache keeps the `most` values that were used most recently.
     """
     value = cache.pop(key, None) or make()
     cache[key] = value
@@ -383,7 +384,7 @@ def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...
 def _orbit_path(
     orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
 ) -> FlownPath:
-    """Path over an aperture, interpolated from an orbit, with its stated accuracy and warnings about it.
+    """Interpolate an orbit, and return the path over an aperture, its stated accuracy, and warnings about it.
 
     Raises `PathFileError` if the orbit does not cover the aperture or is too uncertain.
     """
@@ -423,7 +424,7 @@ def _orbit_path(
 
 
 def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name: str) -> Iterator[StatedAccuracy]:
-    """Yield the accuracy that the file of an orbit states for mid-aperture, if any, along the axes of the scene."""
+    """Yield the accuracy of an orbit at mid-aperture, along the axes of the scene, if its file states an accuracy."""
     accuracy = orbit.stated(center)
     if accuracy is not None:
         covariance = accuracy.covariance
@@ -432,9 +433,9 @@ def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name:
 
 
 def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
-    """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m], because its geometry is unknown.
+    """Refuse an orbit whose uncertainty exceeds a tenth of the slant range [m]: the geometry is then unknown.
 
-    Raises `PathFileError`, with `doubts`, `remedy` and `name` in the message.
+    Raises `PathFileError`. The message contains the warnings `doubts`, the advice `remedy`, and the file name `name`.
     """
     if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
         lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
@@ -532,7 +533,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
 def _by_accuracy(
     mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[StatedAccuracy, str]:
-    """Accuracy that the accuracy file of a log states for the aperture, and the SHA-256 of this file."""
+    """Read the accuracy file of a flight log; return the accuracy over the aperture, and the SHA-256 of the file."""
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
@@ -554,9 +555,9 @@ def _by_accuracy(
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
     """Yield the accuracies of a log around the aperture: the largest stated sigmas, and the largest typical sigma.
 
-    If no sigma is stated along an axis, the largest sigma of the other axes is used for it. The typical sigma of a
-    fix follows from its quality. It is used for fixes without a complete set of stated sigmas. `near` is the range
-    of the fixes around the aperture.
+    If no sigma is stated along an axis, the largest sigma of the other axes is used for this axis. The typical sigma
+    of a fix follows from the quality of the fix. It is used for fixes whose stated sigmas are incomplete. `near`
+    selects the fixes around the aperture.
     """
     unstated: Booleans = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
@@ -575,11 +576,11 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
 
 
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
-    """Complete a motion error with the accuracy that the source of a path states.
+    """Complete a motion error with the accuracy that the source of the path states.
 
     The accuracy is rotated to the axes of the motion error. An accuracy without a direction is used for each axis,
-    because the error may have any direction. If the mission file also states a figure, it is kept, and the figure of
-    the source is listed in `overridden`.
+    because the error may have any direction. If the mission file states the same figure, the figure in the mission
+    file is kept, and the figure of the source is listed in `overridden`.
     """
     if stated.is_typical:
         return error
@@ -616,15 +617,15 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether any two errors of a covariance matrix have a correlation that exceeds rounding errors."""
+    """Whether a covariance matrix has a correlation between two errors that is larger than a rounding error."""
     off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
     return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 
 
 def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
-    """Path over the aperture from a geodetic position: flight along a geodesic with the stated speed and climb rate.
+    """Path over the aperture along a geodesic, from a geodetic position with the stated speed and climb rate.
 
-    A platform without speed and climb rate stays at the position.
+    A platform without speed and climb rate stays at its position.
     """
     position = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
@@ -644,10 +645,10 @@ def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: flo
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
-    """Make a `FlownPath` from a fit, with the residuals of the fit and warnings about it.
+    """Make a `FlownPath` from a fitted path, with the residuals of the fit and warnings about them.
 
-    `words` is a phrase that names the source of the path. `file` and `digest` are the name and the SHA-256 of its
-    file, if there is one.
+    `words` is a phrase that names the source of the path. `file` and `digest` are the name and the SHA-256 of the
+    source file, if there is one.
     """
     return FlownPath(
         fitted.state,

@@ -1,4 +1,4 @@
-"""Platforms of a mission file: their paths, which the file states in one of five ways, and their motion errors.
+"""Platforms of a mission file: their paths, each stated in one of five ways, and their motion errors.
 
 A motion error is the error of the measured motion of a platform.
 """
@@ -106,8 +106,9 @@ PART_REFERENCES = either(list, TextList(), Reference())
 class MotionError(NamedTuple):
     """Error of the measured motion of one platform. A scalar means each axis.
 
-    `of_parts` has the names of the figures that come from parts of the catalogue or from the source of the path, each
-    with its source. `overridden` lists the figures of parts and of the path's source that keys of the file replace.
+    `of_parts` contains the figures that come from parts of the catalogue or from the source of the path, as pairs of
+    the figure's name and its source. `overridden` lists figures of parts, and of the source of the path, that are
+    replaced by keys of the mission file.
     """
 
     frame: Annotated[
@@ -169,9 +170,10 @@ class MotionError(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require a covariance to be stated alone, to fit the axes of the frame, and to have a normal distribution.
+        """Require a covariance that is consistent with the other keys of the motion error.
 
-        The names of the errors in `random` have to be distinct.
+        A covariance must be stated in place of position and velocity, must name only axes of the frame, and must have
+        the distribution `normal`. The names of the errors in `random` must be distinct.
         """
         yield from _names_twice(values.get("random", ()))
         if values.get("navigation") is not None:
@@ -190,9 +192,10 @@ class MotionError(NamedTuple):
             yield from misplaced_axes(covariance, values["frame"])
 
     def stated(self, kind: str) -> Vector | None:
-        """Error of a `kind` along the axes of the frame, or the sigmas of the covariance; None if neither is stated.
+        """Error of the given `kind` along the axes of the frame; None if no error of this kind is stated.
 
-        `kind` is "position" [m], "velocity" [m/s] or "acceleration" [m/s²].
+        `kind` is "position" [m], "velocity" [m/s] or "acceleration" [m/s²]. If a covariance is stated, the sigmas of
+        position and velocity are taken from it.
         """
         if self.covariance is not None and kind in MOTION_KINDS:
             return self.covariance.of(kind)
@@ -202,7 +205,8 @@ class MotionError(NamedTuple):
     def evidence(self, figure: str) -> str | None:
         """Source of a figure; None if no source is stated.
 
-        This is the source of its part, or else the source that the file states for all figures of the section.
+        If the figure comes from a part, this is the part's source. Otherwise it is the source that the mission file
+        states for all figures of the section.
         """
         return dict(self.of_parts).get(figure, self.source)
 
@@ -211,12 +215,12 @@ class MotionError(NamedTuple):
         return figure in dict(self.of_parts)
 
     def key_of(self, figure: str) -> str:
-        """Key under which the file states a figure; `sensor` if the figure does not come from the file itself."""
+        """Key under which the mission file states a figure; `sensor` if the figure is listed in `of_parts`."""
         return "sensor" if self.is_of_part(figure) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
-    """Yield a problem for each random position error that has the name of an earlier one."""
+    """Yield a problem for each random position error that has the same name as an earlier error."""
     seen: set[str] = set()
     for index, error in enumerate(random):
         if error.name in seen:
@@ -227,9 +231,9 @@ def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
 class CommonMotionError(NamedTuple):
     """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis.
 
-    In the frame `scene` both platforms are displaced by one vector. In another frame each platform is displaced by
-    the same components along its own axes: for example, both are too far along their tracks, or too far from the
-    scene.
+    In the frame `scene` both platforms are displaced by the same vector. In any other frame each platform is
+    displaced by the same components along its own axes: for example, both are too far along their tracks, or too far
+    from the scene.
     """
 
     frame: Annotated[
@@ -262,14 +266,14 @@ class CommonMotionError(NamedTuple):
     def is_stated(self) -> bool:
         """Whether the file states a common error.
 
-        An error of zero counts as stated. Axes or a source without an error do not count.
+        An error of zero counts as stated. If only axes or a source are given, no error is stated.
         """
         figures = (self.position, self.velocity, self.acceleration, self.time_tag)
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require distinct names of the errors in `random`."""
+        """Require that the errors in `random` have distinct names."""
         yield from _names_twice(values.get("random", ()))
 
 
@@ -279,7 +283,10 @@ _TALKER = "[A-Z]{2}"
 
 
 class _Lines(Reader[tuple[str, ...]]):
-    """The two lines of an element set."""
+    """The two lines of an element set.
+
+    The class reads these lines if they are written in the mission file itself.
+    """
 
     is_word = True
     accepted = "[line 1, line 2]"
@@ -324,12 +331,12 @@ class OrbitSource(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of the orbit formats, of which one is required."""
+        """Keys of the orbit formats; one of them is required."""
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require exactly one orbit format."""
+        """Require that the orbit is stated in exactly one format."""
         formats = OrbitSource.any_of()
         stated = [key for key in formats if values.get(key) is not None]
         if len(stated) != 1 and values.keys() >= set(formats):
@@ -338,13 +345,16 @@ class OrbitSource(NamedTuple):
 
 
 class _Instant(Reader[Instant]):
-    """An instant of UTC."""
+    """An instant of UTC.
+
+    The class reads an instant, such as `collection.center_time`, from its date and time of day.
+    """
 
     is_word = True
     accepted = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: object) -> Instant:
-        """Read an instant in UTC, such as 2026-06-01T05:20:31.250Z, or an instant with an offset from UTC."""
+        """Read an instant in UTC, such as 2026-06-01T05:20:31.250Z; an offset in place of Z is also accepted."""
         instant = parse_instant(value) if isinstance(value, str) else None
         if instant is None:
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
@@ -354,17 +364,20 @@ class _Instant(Reader[Instant]):
         return instant
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: a date and time as text, or as the date type that YAML readers return."""
+        """JSON Schema: a date and time as a string, or as the date type that YAML readers return."""
         return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
 class _Talker(Text):
-    """Talker of a sentence of NMEA 0183."""
+    """Talker of a sentence of NMEA 0183.
+
+    The class reads the name of a talker, which is two capital letters, such as GP.
+    """
 
     is_word = True
 
     def leaf(self, value: object) -> str:
-        """Return the talker, which is two capital letters such as GP; refuse any other text."""
+        """Return the talker, which is two capital letters such as GP; refuse any other value."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
@@ -437,7 +450,7 @@ ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _I
 class Way:
     """A way to state the path of a platform: required keys, optional keys, and the key of the direction of motion.
 
-    A fixed platform does not need the key of the direction, because it has no direction.
+    The key of the direction is not needed for a fixed platform, which has no direction of motion.
     """
 
     keys: tuple[str, ...]
@@ -478,11 +491,13 @@ class LogNoise(NamedTuple):
     residual : Matrix
         Covariance of the residuals of the fixes in the aperture. [m²]
     correlation_time : float
-        Correlation time of a Gauss-Markov process with the correlation of the residuals. [s]
+        Correlation time of the Gauss-Markov process that describes the correlation of the residuals. [s]
     grid : Matrix
-        For each coordinate of the log, the vector of one step of its decimal grid; zero without such a grid. [m]
+        Step to which each coordinate of the log is rounded, as a vector along the scene's axes; zero if the
+        coordinates are not rounded. [m]
     processed : str, optional
-        Value of `trajectory.processed`; None if the file does not state it.
+        Value of `trajectory.processed`, which states whether the processor uses the smooth path or the fixes of the
+        log; None if the file does not state it.
     """
 
     residual: Matrix
@@ -566,12 +581,12 @@ class FlownPath(NamedTuple):
 
     @property
     def largest_doubt_m(self) -> float:
-        """Largest distance between this path and the true path: `doubt_m`, or the stated accuracy if larger. [m]"""
+        """Largest expected distance from the true path: `doubt_m`, or the stated accuracy if it is larger. [m]"""
         return max([self.doubt_m, *(accuracy.position_m for accuracy in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Map "accuracy" and "earth_orientation" to the name and SHA-256 of the file; None if no file is used."""
+        """Name and SHA-256 of the files for "accuracy" and "earth_orientation"; None for a file that is not used."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -605,9 +620,10 @@ class Platform(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Require one complete way to state the path, above the ground and at least 1 m from the scene centre.
+        """Require one complete way to state the path, and a position that is possible for a platform.
 
-        The distance is checked later if the path depends on a file or on the Earth.
+        The position must be above the ground and at least 1 m from the scene centre. If the path depends on a file or
+        on the position of the scene on the Earth, the distance is checked later.
         """
         wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
@@ -623,7 +639,7 @@ class Platform(NamedTuple):
                 yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
-        """Yield a problem for a platform within 1 m of the scene centre, or for an `error` in undefined axes."""
+        """Yield a problem if the platform is within 1 m of the scene centre, or if `error` has undefined axes."""
         state = self.state
         if state.slant_range < 1:
             at_key: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
@@ -656,7 +672,7 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """First of the keys with which the file states the path, such as `orbit` or `slant_range`."""
+        """First of the keys with which the mission file states the path, such as `orbit` or `slant_range`."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
@@ -670,9 +686,10 @@ class Platform(NamedTuple):
 
     @property
     def state(self) -> PlatformState:
-        """Path of the platform in the frame of the scene.
+        """Path of the platform in the axes of the scene.
 
-        If the platform `is_of_the_earth`, the path is known only once `path` is set. Numbers may be arrays (cases,).
+        If the platform `is_of_the_earth`, the path is known only after `path` has been set. Numbers may be arrays
+        (cases,).
         """
         if self.path is not None:
             return self.path.state
@@ -701,7 +718,7 @@ class Platform(NamedTuple):
 
 
 def _with_fall(state: PlatformState) -> PlatformState:
-    """Add the dynamics of state errors to a path in free fall, for a scene without a position on the Earth.
+    """Add the dynamics of errors in free fall to a freely falling path, for a scene that is not placed on the Earth.
 
     Any other path is returned unchanged.
     """
@@ -713,10 +730,10 @@ def _with_fall(state: PlatformState) -> PlatformState:
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Problem if the given path keys do not state a path in exactly one complete way; otherwise None.
+    """Problem if the path keys in `given` do not form exactly one complete way to state a path; otherwise None.
 
-    `is_fixed` tells whether the speed is 0, and `may_be_fixed` whether the speed has an invalid value, which may be
-    meant as 0.
+    `is_fixed` is true if the speed is 0. `may_be_fixed` is true if the speed has an invalid value, because 0 may have
+    been meant.
     """
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
     known_keys = (*ways[0].keys, *ways[0].optional)
@@ -734,9 +751,9 @@ def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: boo
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
-    """Coefficients of τ³ [m/s³] and τ⁴ [m/s⁴] of a path from its jerk [m/s³] and snap [m/s⁴]: jerk/6 and snap/24.
+    """Coefficients of τ³ [m/s³] and τ⁴ [m/s⁴] of a path: jerk/6 and snap/24, with jerk [m/s³] and snap [m/s⁴].
 
-    A single missing value counts as zero. The result is empty if both are missing.
+    If only jerk or snap is missing, it counts as zero. The result is empty if both are missing.
     """
     if jerk is None and snap is None:
         return ()
@@ -752,7 +769,7 @@ class Platforms(NamedTuple):
 
     @property
     def geometry(self) -> BistaticGeometry:
-        """Paths of transmitter and receiver in the frame of the scene."""
+        """Paths of transmitter and receiver in the axes of the scene."""
         return BistaticGeometry(transmitter=self.transmitter.state, receiver=self.receiver.state)
 
 
@@ -766,8 +783,8 @@ def without_image(
 ) -> Iterator[Problem]:
     """Yield problems of paths that form no image, and of motion errors and lever arms whose axes are undefined.
 
-    `common` is the common motion error. `aperture_time_s` is None if the aperture time is invalid; problems that
-    depend on it are then not found.
+    `common` is the motion error common to both platforms. If the aperture time is invalid, `aperture_time_s` is None,
+    and problems that depend on it are not found.
     """
     geometry = platforms.geometry
     yield from _no_image(geometry, radar, aperture_time_s)
@@ -781,7 +798,7 @@ def without_image(
 
 
 def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s: float | None) -> Iterator[Problem]:
-    """Yield a problem if the geometry forms no image: both platforms are still, or no image plane exists."""
+    """Yield a problem if the geometry forms no image, because both platforms are at rest or no image plane exists."""
     if all(norm(platform.velocity) < STILL_SPEED_MPS for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif radar and aperture_time_s and (reason := degeneracy(geometry, radar, aperture_time_s)):
@@ -789,7 +806,7 @@ def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
-    """Yield a problem for each platform on which the axes of the common motion error are undefined."""
+    """Yield a problem for each platform for which the axes of the common motion error are undefined."""
     for name, platform in platforms._asdict().items():
         if frame == "ric" and platform.path is None:  # its radial direction follows with the path
             continue
@@ -800,10 +817,11 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
 
 
 def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> Booleans:
-    """Whether a platform keeps a horizontal direction of motion over apertures of half-length `half` (cases,) [s].
+    """Whether a platform keeps a horizontal direction of motion over the aperture.
 
-    It does not if its velocity becomes vertical, stops or turns back. The result is true for a fixed platform, whose
-    direction does not matter. `margin` multiplies the smallest horizontal speed that is required.
+    The result is false if the velocity becomes vertical or zero, or if the platform turns back. The result is true
+    for a fixed platform, whose direction does not matter. `half` (cases,) is half the aperture time [s]. `margin` is
+    a factor on the smallest horizontal speed that is required.
     """
     times = half * _FINE_APERTURE_TIMES
     u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
@@ -816,9 +834,9 @@ def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> B
 
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
-    """Yield a problem for each lever arm on a platform that does not keep a horizontal direction over the aperture.
+    """Yield a problem for each lever arm on a platform that does not keep a horizontal direction of motion.
 
-    `half` is half the aperture time. [s]
+    `half` is half the aperture time, over which the direction has to be kept. [s]
     """
     for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
@@ -832,7 +850,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
-    """Yield a problem for each platform that goes below the ground, z < 0, during the aperture."""
+    """Yield a problem for each platform that goes below the ground (z < 0) during the aperture."""
     for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
@@ -848,15 +866,15 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
-    """Smallest distance between the platforms over apertures of half-length `half` [s]. [m]
+    """Smallest distance between the platforms during the aperture. [m]
 
-    `apart` is the path of one platform relative to the other.
+    `apart` is the path of one platform relative to the other, and `half` is half the aperture time. [s]
     """
     return np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES)).min(axis=0))
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    """Yield a problem if the platforms come too close to each other within the aperture for a direct path.
+    """Yield a problem if, during the aperture, the platforms come too close to each other for a direct path.
 
     `apart` is the path of one platform relative to the other, and `half` is half the aperture time. [s]
     """
@@ -871,10 +889,10 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Yield the slow times in the aperture at which the height of a platform may be smallest. [s]
+    """Yield the slow times at which the height of a platform during the aperture may be smallest. [s]
 
-    For a quadratic path, these are the ends of the aperture, and the time at which the platform stops sinking. For
-    any other path, they are times over the whole aperture, in steps of 1/64 of it. `half` is half the aperture time.
+    For a quadratic path, these are the ends of the aperture and the time at which the platform stops sinking. For
+    any other path, they are spaced by 1/64 of the aperture. `half` is half the aperture time. [s]
     """
     yield from (-half, half)
     if not state.is_quadratic:

@@ -1,6 +1,6 @@
 """Section of a mission file with the propagation delays that remain after correction.
 
-A leg is the signal path between one platform and the scene. Delays are at the zenith; a leg at a low elevation
+A leg is the signal path between one platform and the scene. Stated delays are zenith delays; a leg at a low elevation
 has a longer delay. Values are in SI units, 1 sigma.
 """
 
@@ -44,7 +44,7 @@ class LegDelay(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse a leg that states no delay."""
+        """Yield a problem for a leg that states no delay."""
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY} or any(
             values[delay] is not None for delay in DELAYS
         ):
@@ -63,7 +63,10 @@ _LEG = Section(LegDelay)
 
 
 class Propagation(NamedTuple):
-    """Residual delays in the air after correction, 1 sigma: one air for both legs, or separate delays of each leg."""
+    """Residual delays in the air after correction, 1 sigma: one air for both legs, or separate delays of each leg.
+
+    The legs have "one air" if the signals on both legs cross the same atmosphere and have the same zenith delays.
+    """
 
     zenith_delay: Annotated[
         float | None, Key(_ZENITH_DELAY, "Delay of the troposphere, of one air over both legs.")
@@ -86,9 +89,9 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse delays that are stated both jointly for the two legs and separately for a leg.
+        """Refuse delays that are stated both jointly for the two legs and separately for one leg.
 
-        Missing delays and an unused correlation time are refused too.
+        A section without delays, and a correlation time that applies to no leg, are refused too.
         """
         if not values.keys() >= {*DELAYS, _CORRELATION_TIME_KEY, *Platforms._fields}:
             return
@@ -127,7 +130,7 @@ class Propagation(NamedTuple):
         return None if leg is None else leg.zenith_electron_content
 
     def source_of(self, platform: str) -> str | None:
-        """Source that the file states for the delays on the leg of a platform; None if it states none."""
+        """Source that the file states for the delays on the leg of a platform; None if no source is stated."""
         leg = self.leg(platform)
         return None if leg is None else leg.source
 
@@ -153,21 +156,27 @@ PROPAGATION = Section(Propagation)
 
 
 def height_of(position: Vectors) -> PerCase:
-    """Height of positions (…) above a sphere of the Earth's mean radius through the scene centre. [m]"""
+    """Height above a sphere of the Earth's mean radius, which passes through the scene centre. [m]
+
+    The components of `position` may have any shape (…); the result has the same shape.
+    """
     x, y, z = position
     distance: PerCase = np.sqrt(x * x + y * y + (z + EARTH_RADIUS_M) ** 2)
     return distance - EARTH_RADIUS_M
 
 
 def elevation_deg(position: Vectors) -> Floats:
-    """Elevation of positions (…) seen from the scene centre. [deg]"""
+    """Elevation of a position as seen from the scene centre. [deg]
+
+    The components of `position` may have any shape (…); the result has the same shape.
+    """
     x, y, z = position
     elevation: Floats = np.degrees(np.arctan2(z, np.hypot(x, y)))
     return elevation
 
 
 def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats:
-    """Smallest elevation of a platform during the aperture, seen from the scene centre. [deg]"""
+    """Smallest elevation of a platform during the aperture, as seen from the scene centre. [deg]"""
     half = np.asarray(aperture_time_s, dtype=float) / 2
     least: Floats = elevation_deg(path.place(_COARSE_APERTURE_TIMES * half)).min(axis=0)
     return least
@@ -176,10 +185,10 @@ def least_elevation_deg(path: PlatformState, aperture_time_s: PerCase) -> Floats
 def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: PerCase
 ) -> Iterator[tuple[str, str, Floats]]:
-    """Yield the smallest elevation during the aperture [deg] for each stated delay of each leg.
+    """Yield the smallest elevation during the aperture for each delay that is stated for a leg. [deg]
 
-    Each item is the platform, the key of the delay, and the elevation. For the electron content, the elevation is set
-    to 90° on a leg below the ionosphere.
+    Each item consists of the name of the platform, the key of the delay, and the elevation. For the electron content,
+    the elevation is set to 90° if the platform is below the ionosphere.
     """
     for name, path in paths.items():
         leg = propagation.leg(name)
@@ -194,7 +203,10 @@ def least_elevations(
 
 
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
-    """Yield a problem for each delay on a leg whose elevation falls below `LEAST_ELEVATION_DEG` in the aperture."""
+    """Yield a problem for each delay on a leg whose elevation falls below `LEAST_ELEVATION_DEG`.
+
+    The smallest elevation during the aperture is used.
+    """
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
     for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()

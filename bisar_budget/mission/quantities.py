@@ -1,4 +1,4 @@
-"""Read or replace the numbers of a mission, each with its unit, by their keys.
+"""Access to the numbers of a mission and their units: a number is read, or replaced, by means of its key.
 
 A new value may be a string as in a mission file, a number in SI units, or a quantity of astropy or pint.
 """
@@ -60,7 +60,10 @@ FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 
 class QuestionError(Exception):
-    """A question that a mission cannot answer; the message says why, and what is accepted."""
+    """A question that a mission cannot answer; the message says why, and what is accepted.
+
+    A question is a request such as a search for a value, or a sweep over a key.
+    """
 
 
 class TableError(QuestionError):
@@ -72,17 +75,20 @@ class TableError(QuestionError):
 
     @classmethod
     def of_faults(cls, file: str, faults: Sequence[Fault]) -> "TableError":
-        """Make an error from faults that have a line and a column in the file."""
+        """Make an error from faults, each with its line and column in the file."""
         return cls([f"{printable(file)}:{fault.line}:{fault.column}: {fault}" for fault in faults])
 
     @classmethod
     def of_file(cls, file: str, problem: str) -> "TableError":
-        """Make an error from a problem of the file as a whole."""
+        """Make an error from a problem that concerns the file as a whole."""
         return cls([f"Error: {printable(file)}: {printable(problem)}"])
 
 
 class Number(NamedTuple):
-    """A number of the file: its reader, its value in SI (None if the file has none) and the unit of its texts."""
+    """A number of the file: its reader, its value in SI (None if the file has none) and the unit of its texts.
+
+    The unit is used when values of the number are written as text.
+    """
 
     key: str
     reader: Quantity
@@ -101,11 +107,11 @@ class Number(NamedTuple):
 
     @property
     def scale(self) -> tuple[float, float]:
-        """Factor and divisor that convert a value from the number's unit to SI: value · factor / divisor."""
+        """Factor and divisor that convert a value from the unit of the number to SI: value · factor / divisor."""
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Format a value, given in SI units, in the number's unit with `ANSWER_DIGITS` significant digits.
+        """Format a value, given in SI, in the unit of the number with `ANSWER_DIGITS` significant digits.
 
         The value is rounded up if `is_up` is true, down if it is false, and to the nearest if it is None.
         """
@@ -117,18 +123,20 @@ class Number(NamedTuple):
         return f"{number:.{ANSWER_DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """Copy of the number with the unit of the upper end `B` of a range `A..B`.
+        """Copy of the number whose unit is the unit of `B` in the string `between`, which has the form `A..B`.
 
-        The number is unchanged if the file has a value, or if the unit of `B` does not fit its kind of quantity.
+        The number is returned unchanged if the file has a value, or if the unit of `B` belongs to another kind of
+        quantity.
         """
         unit = units.unit_behind((between or "").rpartition("..")[2])
         unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
-        """Convert a string written by the method `text` to a value in SI.
+        """Convert a string, as written by the method `text`, to a value in SI.
 
-        Apart from rounding errors, the value is the same as the reader of the file returns.
+        Apart from rounding errors, the result equals the value that the reader of mission files returns for the
+        string.
         """
         return parse_quantity(text, self.dimension)
 
@@ -150,7 +158,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> JsonObject:
-    """Content of a mission's file with the values of its `--set` options, as strings, lists and mappings."""
+    """Content of a mission file with the values set by `--set` options, as nested lists and mappings of strings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: JsonObject = tree.root
@@ -158,18 +166,19 @@ def tree_of(mission: Mission) -> JsonObject:
 
 
 def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
-    """Find the number that a key names, with its unit; a single value for all three axes counts as a number.
+    """Find the number at a key, with its unit; a single value that applies to all three axes counts as a number.
 
     Parameters
     ----------
     tree : dict
-        Content of the file, with values as strings.
+        Content of the file; values are strings.
     key : str
         Path of the key.
     of_all : str
-        Phrase about other accepted keys, to add to the message about a key with three numbers.
+        Phrase about other accepted keys, which is added to the error message about a key with three numbers.
     is_for_each : bool
-        Whether the number is meant for each axis. If the file has three values, the largest absolute value is used.
+        Whether a single number is needed that applies to each axis. If the file has three values, the value with the
+        largest magnitude is then used.
 
     Raises
     ------
@@ -196,11 +205,12 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
 
 
 def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
-    """Describe a key that accepts words, with its current value; None for a key that does not accept words.
+    """Describe a key whose values are words, and its current value; None for a key with other values.
 
-    `text` is the new value, which determines the form of a key that has several. For example, the split of a budget
-    may be the name of a rule, or shares; and the parts may be a single name, or a list. Raises `QuestionError` if the
-    key does not exist, or if the file has a list and `text` is a single word.
+    `text` is the new value. If a key accepts values of several forms, this value determines the form. For example,
+    `allocation.split` is either the name of a rule or a set of shares, and `sensor` is either the name of one
+    catalogue part or a list of such names. Raises `QuestionError` if the key does not exist, or if the file has a
+    list and `text` is a single word.
     """
     reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -216,9 +226,10 @@ def choices_of(tree: JsonObject, key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: object) -> Number:
-    """Make the `Number` of a key from its value in the file, in the unit of the value or else in the usual unit.
+    """Make the `Number` of a key from its value in the file.
 
-    `value` is None if the file has no value.
+    Its unit is the unit of the value, or the usual unit if the value is written without a unit. `value` is None if
+    the file has no value.
     """
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
@@ -232,7 +243,8 @@ def as_number(key: str, reader: Quantity, value: object) -> Number:
 def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Content]:
     """Return the reader of a key, and the value of the key in the file; the value is None if it is missing.
 
-    The reader may still accept several forms (`form_of`). Raises `QuestionError` if the key does not exist.
+    The reader may still be a choice between several forms; see `form_of`. Raises `QuestionError` if the key does not
+    exist.
     """
     reader: Reader[object] = MISSION
     value: Content = tree
@@ -261,14 +273,18 @@ def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Conte
 
 
 def form_of(reader: Reader[object], value: object) -> Reader[object]:
-    """Reader of the form in which a value is written; `reader` itself if it accepts only one form."""
+    """Return the reader of the form in which `value` is written; `reader` itself if it accepts only one form."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
     return reader
 
 
 class Range(NamedTuple):
-    """Range of a search: from `low` to `high` in SI; `is_log` with steps of equal ratio, `is_circle` once around."""
+    """Range of a search: from `low` to `high` in SI; `is_log` with steps of equal ratio, `is_circle` once around.
+
+    The search tries values in this range. The ratio of successive values is constant if `is_log`; otherwise their
+    difference is constant. If `is_circle`, the values are directions, and the range is a full circle.
+    """
 
     low: float
     high: float
@@ -276,7 +292,10 @@ class Range(NamedTuple):
     is_circle: bool = False
 
     def places(self, count: int) -> list[float]:
-        """Divide the range into `count` values, ends included, evenly spaced or, if `is_log`, with equal ratios."""
+        """Divide the range into `count` values, including both ends.
+
+        The values are evenly spaced, or have equal ratios if `is_log`.
+        """
         fractions = [index / (count - 1) for index in range(1, count - 1)]
         if self.is_log:
             between = [self.low * (self.high / self.low) ** fraction for fraction in fractions]
@@ -286,16 +305,17 @@ class Range(NamedTuple):
 
 
 def range_of(number: Number, between: str | None) -> Range:
-    """Range in which to search for the value of a number, from a string `A..B`.
+    """Range in which the value of a number is searched for, read from a string `A..B`.
 
-    If `between` is None, the range extends by one decade, or by 20 dB for a level, to each side of the value in the
-    file. For a direction it is the full circle, and for an elevation or a latitude it covers all accepted values.
+    If `between` is None, the range extends from the value in the file by one decade, or by 20 dB for a level, to each
+    side. For a direction it is then the full circle, and for an elevation or a latitude it covers all accepted
+    values.
 
     Raises
     ------
     QuestionError
-        `between` is not a range, is empty, or contains values that the key cannot have; or the file has no value
-        around which a range could be chosen.
+        `between` is not a range, is empty, or contains values that the key cannot have; or it is None and the file
+        has no value around which a range could be chosen.
     """
     gt, ge, lt, le = number.reader.bounds
     if between is None:
@@ -362,13 +382,16 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 
 
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
-    """Return a mission in which the value of a key is set to a number, or to an array (cases,)."""
+    """Return a mission in which the value of a key is replaced by a number, or by an array (cases,)."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
     return changed_mission
 
 
 def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
-    """Return a section or value with a new number at the path `steps`; a triple is set to it on all three axes."""
+    """Return a copy of a section or value in which the number at the path `steps` is replaced.
+
+    A value with three components gets the new number in each of them.
+    """
     if not steps:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
@@ -391,7 +414,7 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
 
 
 def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue) -> SectionValue:
-    """Return a curve with a new ordinate at one of its points.
+    """Return a curve in which the ordinate of one point is replaced.
 
     `name` is the key of the curve, and `point` is the abscissa of the point as text, such as "10 Hz".
     """
@@ -402,9 +425,9 @@ def _with_point(curve: SectionValue, name: str, point: str, number: SectionValue
 
 
 def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionValue) -> Covariance:
-    """Return a covariance with new sigmas or a new correlation.
+    """Return a covariance in which sigmas or a correlation are replaced by a number.
 
-    `steps` name one axis, or "position" or "velocity" with all its axes, or a pair of correlated errors.
+    `steps` name a single axis, all axes of "position" or "velocity", or a pair of correlated errors.
     """
     kind, *remaining = steps
     if kind in MOTION_KINDS:
@@ -421,15 +444,15 @@ def _with_element(covariance: Covariance, steps: Sequence[str], number: SectionV
 
 
 def value_at(mission: Mission, key: str) -> SectionValue:
-    """Value of a key in a mission, in SI: a number, a tuple of three numbers, or None if the mission has none.
+    """Value of a key of a mission, in SI: a number, a tuple of three numbers, or None if there is no value.
 
-    For a covariance the value is the sigma. A figure that comes from a part has the value of the part.
+    For a covariance, the sigma is returned. For a figure that comes from a part, the part's figure is returned.
     """
     return _value_below(mission, parts_of(key))
 
 
 def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
-    """Value at the path `steps` inside a section or value; None if there is none."""
+    """Value at the path `steps` inside a section or a value; None if there is no such value."""
     if not steps or value is None:
         return value
     if isinstance(value, Covariance):
@@ -457,9 +480,10 @@ def _point(curve: SectionValue, name: str, point: str) -> PerCase | None:
 
 
 def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | None:
-    """Sigma of a covariance on one axis, or its sigmas on all three axes of a kind of error.
+    """Sigma of a covariance along one axis, or the sigmas along all three axes.
 
-    None for a correlation, because it is not the size of an error.
+    The first of `steps` is "position" or "velocity". Any other key names a correlation; the result is then None,
+    because a correlation is not the size of an error.
     """
     kind, *axis = steps
     if kind not in MOTION_KINDS:
@@ -469,9 +493,10 @@ def _element(covariance: Covariance, steps: Sequence[str]) -> float | Vector | N
 
 # ---------------------------------------------------------------- specified sizes of errors
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
-    """Return a mission in which each entry of `specifications` is parsed as a `Number` of the key that it limits.
+    """Return a mission in which each specified size of an error has been converted to a `Number`.
 
-    Invalid specifications become faults of the tree.
+    Each entry of `specifications` is parsed in the same way as the declared size of that error. Invalid entries are
+    reported as faults in `tree`.
     """
     read = {}
     for key, text in mission.specifications.items():
@@ -495,10 +520,10 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> PerCase | None:
-    """Size in SI that a mission states for the error with the key of `number`; None if no size is stated.
+    """Size, in SI, that a mission states for the error to which `number` belongs; None if no size is stated.
 
-    For a triple, the size is the largest absolute value of the three axes. For the level of a stated spectrum, the
-    size is 0 dB if the file does not state the level.
+    If there are three components, the size is their largest absolute value. If a spectrum is stated without a level,
+    the size of its level is 0 dB.
     """
     value: Vector | PerCase | None = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
@@ -517,7 +542,7 @@ def largest_at(mission: Mission, number: Number) -> PerCase | None:
 
 # ---------------------------------------------------------------- values that a caller gives
 def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
-    """Return a mission with some values changed or added, as `--set` does.
+    """Return a mission in which some values are changed or added, as with the option `--set`.
 
     Parameters
     ----------
@@ -525,13 +550,13 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
         The mission as loaded.
     values : mapping of str to str, float, sequence, quantity or None
         New values by the paths of their keys in the mission file, such as `collection.aperture_time`. A value is a
-        string as in a file, such as `"8 s"`; a number in SI; a list of three; or a quantity of pint or astropy. None
-        removes the key.
+        string as in a file, such as `"8 s"`; a number in SI; a list of three numbers; or a quantity of pint or
+        astropy. None removes the key.
 
     Raises
     ------
     MissionError
-        The mission cannot be used with the values, or a key is unknown.
+        The mission cannot be used with the new values, or a key is unknown.
     """
     tree = tree_of(mission)
     changes = [SetValue(key, text_of(_si_of(tree, key), value)) for key, value in values.items()]
@@ -539,7 +564,7 @@ def changed(mission: Mission, values: Mapping[str, object]) -> Mission:
 
 
 def _si_of(tree: JsonObject, key: str) -> str:
-    """SI unit of the number or of the three numbers at a key; empty if the key has no number with a unit."""
+    """SI unit of the number or numbers at a key; empty if the key has no number with a unit."""
     for number_key in (key, f"{key}.0"):
         try:
             return number_of(tree, number_key).dimension.si
@@ -549,7 +574,7 @@ def _si_of(tree: JsonObject, key: str) -> str:
 
 
 def text_of(si: str, value: object) -> str:
-    """Format a value for a mission file: a string, number, boolean, quantity, list of these, or None.
+    """Format a value as text for a mission file: a string, number, boolean, quantity, None, or a list of such values.
 
     Numbers are in the SI unit `si`; if it is empty, they are written without a unit. None becomes `null`, which
     removes a key.
@@ -579,12 +604,12 @@ def text_of(si: str, value: object) -> str:
 
 # Quantities of other packages are recognised by their attributes, so that no such package has to be installed.
 def is_quantity(value: object) -> TypeGuard[Measured]:
-    """Whether a value is a quantity of astropy, which has `to_value`, or of pint, which has a magnitude."""
+    """Whether a value is a quantity of astropy, which has a method `to_value`, or of pint, which has a magnitude."""
     return hasattr(value, "to_value") or (hasattr(value, "magnitude") and hasattr(value, "units"))
 
 
 def magnitude(value: Measured, unit: str) -> Measured:
-    """Convert a quantity of astropy or pint to a unit, and return its number or array."""
+    """Convert a quantity of astropy or pint to a unit, and return the number or array without the unit."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude

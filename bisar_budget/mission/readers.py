@@ -1,7 +1,7 @@
 """Readers of values in a mission file: one reader per kind of value, which also writes the JSON Schema of the kind.
 
 A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`. A
-reader takes a value of the file, which is a string, list or mapping, or a number in SI from a case of a sweep. It
+reader takes a value of the file, which is a string, list or mapping, or a number in SI if a sweep sets the value. It
 passes each problem to the function `report`, and then returns `INVALID`.
 
 A validation library would do the same, but its import takes five times as long. The import time matters because users
@@ -29,7 +29,10 @@ MISSING = "is missing"  # problem of a required key
 
 
 class Invalid(Enum):
-    """Type of `INVALID`."""
+    """Type of `INVALID`.
+
+    `INVALID` takes the place of a value that has been reported as invalid.
+    """
 
     INVALID = "invalid"
 
@@ -64,18 +67,22 @@ _NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappi
 def date_schema(pattern: str) -> JsonObject:
     """JSON Schema of a date or an instant.
 
-    It accepts a string that matches `pattern`, or the date type that YAML readers return and JSON does not have.
+    It accepts a string that matches `pattern`. It also accepts the date type that YAML readers return, for which JSON
+    has no type.
     """
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
 class Reader(Generic[T_co]):
-    """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare."""
+    """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare.
+
+    The class attribute `is_word` is true if the values are words or whole numbers.
+    """
 
     is_word = False
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Return the value converted by `leaf`; if that fails, report the problem at `path` and return `INVALID`."""
+        """Return the value converted by `leaf`; an invalid value is reported at `path`, and `INVALID` is returned."""
         try:
             return self.leaf(value)
         except InvalidValueError as error:
@@ -83,15 +90,15 @@ class Reader(Generic[T_co]):
             return INVALID
 
     def leaf(self, value: object) -> T_co:
-        """Convert a value of the file; raises `InvalidValueError` if the value is invalid."""
+        """Convert a single value, not a list or a mapping; raises `InvalidValueError` if the value is invalid."""
         raise NotImplementedError
 
     def below(self, step: str) -> "Reader[object] | None":
-        """Reader of the value at a key or an index inside this value; None if there is no such key or index."""
+        """Reader of the value at the key or index `step` inside this value; None if there is no such key or index."""
         return None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of the accepted values; sections and quantities add shared schemas to `definitions`."""
+        """JSON Schema of the accepted values; schemas that several keys share are added to `definitions`."""
         raise NotImplementedError
 
 
@@ -105,9 +112,9 @@ class Key(NamedTuple):
 class Quantity(Reader[float]):
     """A number with a unit, within bounds; read as a float in SI. Decibels stay decibels.
 
-    `dimension` is the kind of quantity with its units. The bounds are in SI: greater than `gt`, at least `ge`, less
-    than `lt`, at most `le`. The bounds keep all later squares and quotients finite; realistic values are far from the
-    widest bounds.
+    `dimension` is the kind of quantity and has its units. The bounds are in SI: greater than `gt`, at least `ge`,
+    less than `lt`, at most `le`. The bounds ensure that squares and quotients of the numbers are finite; realistic
+    values are far from the widest bounds.
     """
 
     def __init__(
@@ -151,9 +158,9 @@ class Quantity(Reader[float]):
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
     def _unit_hint(self, value: object) -> str:
-        """Hint that tells how a bare number is interpreted, in case its unit was forgotten.
+        """Hint that tells how a number without a unit is interpreted, in case the unit was forgotten.
 
-        The hint is empty if the value is not a bare number, or if the number cannot lack a unit.
+        The hint is empty if the value has a unit, or if numbers of this kind always need a unit.
         """
         text = str(value).strip()
         if not text or not text[-1].isdigit():
@@ -181,7 +188,7 @@ class Quantity(Reader[float]):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> JsonObject:
-        """JSON Schema that refuses zero, positive or negative numbers in any unit, if the bounds exclude them."""
+        """JSON Schema that refuses zero, positive or negative numbers in any unit if the bounds exclude them."""
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
             return {}
@@ -201,9 +208,9 @@ _UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spelling
 
 
 def _quantity_schema(dimension: Dimension) -> JsonObject:
-    """JSON Schema of a kind of quantity: a number, or a string with a number whose unit is not of another kind.
+    """JSON Schema of a kind of quantity: a number, or a string with a number, optionally followed by a unit.
 
-    If the kind needs a unit, zero is the only accepted bare number.
+    Units of other kinds of quantities are refused. If the kind needs a unit, zero is the only accepted bare number.
     """
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
     all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
@@ -219,7 +226,10 @@ def _quantity_schema(dimension: Dimension) -> JsonObject:
 
 
 class Triple(Reader[tuple[float, ...]]):
-    """Three components; with `or_scalar` a single value stands for each of them."""
+    """Three components; with `or_scalar` a single value stands for each of them.
+
+    The class reads them as a tuple of three numbers.
+    """
 
     def __init__(self, component: Quantity, *, or_scalar: bool = False) -> None:
         self.component = component
@@ -242,11 +252,11 @@ class Triple(Reader[tuple[float, ...]]):
         return components if are_valid(components) else INVALID
 
     def _bracketed(self, value: object) -> str:
-        """Hint to put brackets around three values in a string; empty if the string does not have three values.
+        """Hint to put brackets around three values in a string; empty if the string does not contain three values.
 
         If each of the three values has a unit or is 0, the hint contains the corrected string. Otherwise, if blanks
-        follow the commas, it only asks for brackets and units, since `1, 2, 3 km` is not three lengths. Without
-        blanks there is no hint, since `1,234,567 m` may be a single number.
+        follow the commas, the hint only asks for brackets and units, because `1, 2, 3 km` does not have three
+        lengths. Without blanks there is no hint, because `1,234,567 m` may be a single number.
         """
         if not isinstance(value, str):
             return ""
@@ -268,14 +278,17 @@ class Triple(Reader[tuple[float, ...]]):
         return self.component if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of three components, or, with `or_scalar`, also a single value."""
+        """JSON Schema: an array of three components. If `or_scalar`, a single value is also accepted."""
         single = self.component.schema(definitions)
         triple = {"type": "array", "items": single, "minItems": 3, "maxItems": 3}
         return {"anyOf": [single, triple]} if self.or_scalar else triple
 
 
 class Text(Reader[str]):
-    """One line of printable text."""
+    """One line of printable text.
+
+    The class reads such a line as a string.
+    """
 
     name, max_characters = "Text", _MAX_TEXT_CHARACTERS
 
@@ -295,7 +308,7 @@ class Text(Reader[str]):
         return value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema that accepts any single value, because YAML readers of other tools convert some strings.
+        """JSON Schema that accepts any single value, because other YAML readers convert some strings to other types.
 
         They read 007 as a number, `yes` as true, and 2026-06-01 as a date.
         """
@@ -308,24 +321,33 @@ class Text(Reader[str]):
 
 
 class Statement(Text):
-    """The text of a requirement: one line, longer than other texts."""
+    """The text of a requirement: one line, longer than other texts.
+
+    The class reads such a text as a string.
+    """
 
     name, max_characters = "Statement", 4000
 
 
 class Reference(Text):
-    """Name of a part or of a file that values are taken from."""
+    """Name of a part or of a file that values are taken from.
+
+    The class reads such a name as a string.
+    """
 
     is_word = True
 
 
 class Glob(Text):
-    """An id, or a pattern of ids with `*`, `?` and `[...]`."""
+    """An id, or a pattern of ids with `*`, `?` and `[...]`.
+
+    The class reads such an id or pattern as a string.
+    """
 
     def leaf(self, value: object) -> str:
-        """Return the pattern; refuse more than `_MAX_WILDCARD_COUNT` wildcards.
+        """Return the pattern; refuse a pattern with more than `_MAX_WILDCARD_COUNT` wildcards.
 
-        With more wildcards, matching would take too long.
+        With more wildcards, matching could take too long.
         """
         pattern = super().leaf(value)
         if sum(map(pattern.count, "*?[")) > _MAX_WILDCARD_COUNT:
@@ -336,7 +358,8 @@ class Glob(Text):
 class Choice(Reader[str]):
     """One of a few words; `accepted` lists words for messages, by default all.
 
-    `is_more` is a function that tells whether a word that is not in the list is accepted too.
+    The class reads such a word as a string. The function `is_more` tells whether a word that is not in the list is
+    also accepted.
     """
 
     is_word = True
@@ -345,7 +368,7 @@ class Choice(Reader[str]):
         self.names, self.accepted, self.is_more = names, accepted or ", ".join(names), is_more
 
     def leaf(self, value: object) -> str:
-        """Return the word; refuse an unknown word, with a hint that names the nearest known word."""
+        """Return the word; an unknown word is refused, with a hint that names the most similar known word."""
         if isinstance(value, str) and (value in self.names or self.is_more(value)):
             return value
         near = did_you_mean(value, self.names)
@@ -360,13 +383,16 @@ _YES_NO = {word: word.lower() == "true" for word in ("true", "True", "TRUE", "fa
 
 
 class YesNo(Reader[bool]):
-    """True or false."""
+    """True or false.
+
+    The class reads such a value as a boolean.
+    """
 
     is_word = True
     accepted = "true or false"
 
     def leaf(self, value: object) -> bool:
-        """Read true or false in the spellings of YAML 1.2; a boolean from an option is accepted too."""
+        """Read true or false, spelt as in YAML 1.2; a boolean from an option is also accepted."""
         boolean = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
         if boolean is None:
             raise InvalidValueError("must be true or false", "accepted: true, false")
@@ -378,7 +404,10 @@ class YesNo(Reader[bool]):
 
 
 class Words(Reader[tuple[str, ...]]):
-    """A list of known words, each at most once; the arguments are those of `Choice`."""
+    """A list of known words, each at most once; the arguments are those of `Choice`.
+
+    The class reads such a list as a tuple of strings.
+    """
 
     def __init__(self, *names: str, accepted: str, is_more: Callable[[str], bool] = lambda word: False) -> None:
         self.word: Reader[str] = Choice(*names, accepted=accepted, is_more=is_more)
@@ -398,12 +427,15 @@ class Words(Reader[tuple[str, ...]]):
         return words if are_valid(words) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of accepted words, without repetitions."""
+        """JSON Schema: an array of accepted words without repetitions."""
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
 class TextList(Words):
-    """A list of 1 to `most` texts, each at most once; by default names of parts."""
+    """A list of 1 to `most` texts, each at most once; by default names of parts.
+
+    The class reads such a list as a tuple of strings.
+    """
 
     is_word = True
 
@@ -422,7 +454,10 @@ class TextList(Words):
 
 
 class Lines(Words):
-    """A list of texts of one line, each at most once."""
+    """A list of texts of one line, each at most once.
+
+    The class reads such a list as a tuple of strings.
+    """
 
     def __init__(self) -> None:
         self.word = Text()
@@ -430,16 +465,19 @@ class Lines(Words):
         self.fewest, self.most = 0, _MAX_ENTRY_COUNT
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of one text in the list; None if `step` is no index."""
+        """Reader of one string in the list; None if `step` is not an index."""
         return self.word if is_index(step) else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an array of texts."""
+        """JSON Schema: an array of strings."""
         return {"type": "array", "items": self.word.schema(definitions), "maxItems": self.most}
 
 
 class Whole(Reader[int]):
-    """A whole number within bounds."""
+    """A whole number within bounds.
+
+    The class reads such a number from its digits.
+    """
 
     is_word = True
 
@@ -447,7 +485,10 @@ class Whole(Reader[int]):
         self.low, self.high = low, high
 
     def leaf(self, value: object) -> int:
-        """Read a whole number from decimal digits; a leading zero is refused, because YAML 1.1 reads it as octal."""
+        """Read a whole number from its decimal digits.
+
+        A leading zero is refused, because YAML 1.1 reads such a number as octal.
+        """
         if isinstance(value, str) and re.fullmatch(r"0|-?[1-9]\d{0,17}", value.strip(), re.ASCII):
             number = int(value)
             if self.low <= number <= self.high:
@@ -455,13 +496,16 @@ class Whole(Reader[int]):
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an integer within the bounds, or its digits in quotes."""
+        """JSON Schema: an integer within the bounds, or a string with an integer."""
         number = {"type": "integer", "minimum": self.low, "maximum": self.high}
         return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
 
 class Version(Reader[int]):
-    """The schema version."""
+    """The schema version.
+
+    The class reads this number, and accepts only 1.
+    """
 
     def leaf(self, value: object) -> int:
         """Return 1, the only schema version; refuse any other value."""
@@ -470,12 +514,15 @@ class Version(Reader[int]):
         return 1
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: the number 1, in quotes or not."""
+        """JSON Schema: the number 1, or the string "1"."""
         return {"enum": [1, "1"]}
 
 
 class Day(Reader["date"]):
-    """A calendar date."""
+    """A calendar date.
+
+    The class reads such a date as a `date` of Python.
+    """
 
     def leaf(self, value: object) -> "date":
         """Read a calendar date such as 2027-03-31."""
@@ -489,16 +536,16 @@ class Day(Reader["date"]):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: a date as text, or as the date type that YAML readers return."""
+        """JSON Schema: a date as a string, or as the date type that YAML readers return."""
         return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
     value: object, kind: type[SizedT] | tuple[type[SizedT], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> TypeGuard[SizedT]:
-    """Whether a value is of the type `kind` and has at most `_MAX_ID_COUNT` entries; otherwise a problem is reported.
+    """Whether a value is of the type `kind` and has at most `_MAX_ID_COUNT` entries; if not, a problem is reported.
 
-    `kind_problem` is the text of the problem for another type.
+    `kind_problem` is the text of the problem if the value is of another type.
     """
     if not isinstance(value, kind):
         report(path, Problem(kind_problem))
@@ -510,7 +557,10 @@ def _is_few(
 
 
 class TextMap(Reader[dict[str, str]]):
-    """A mapping of any key to text; `of` names the kind of the keys, and `text` reads the texts."""
+    """A mapping of any key to text; `of` names the kind of the keys, and `text` reads the texts.
+
+    The class reads such a mapping as a dictionary of strings.
+    """
 
     def __init__(self, of: str = "row id", text: Text | None = None) -> None:
         self.of, self.text = of, text or Text()
@@ -532,13 +582,16 @@ class TextMap(Reader[dict[str, str]]):
 
 
 class IdMap(Reader[dict[str, tuple[str, ...]]]):
-    """A mapping of ids of rows and requirements to requirement ids of the project: a text, or a list of texts."""
+    """A mapping of ids of rows and requirements to requirement ids of the project: a text, or a list of texts.
+
+    The class reads such a mapping as a dictionary of tuples of strings.
+    """
 
     def __init__(self) -> None:
         self.text, self.texts = Text(), TextList(Text(), _MAX_OWN_ID_COUNT, "ids")
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, tuple[str, ...]] | Invalid:
-        """Read the ids of each key as a tuple; a problem with an id is reported at its path."""
+        """Read the ids at each key as a tuple; a problem with an id is reported at the path of the id."""
         if not _is_few(value, dict, "must be a mapping of keys to ids", path, report):
             return INVALID
         result = {key: self._ids(ids, (*path, key), report) for key, ids in value.items()}
@@ -551,13 +604,16 @@ class IdMap(Reader[dict[str, tuple[str, ...]]]):
         return INVALID if text is INVALID else (text,)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object with arbitrary keys, and with strings or arrays of strings as values."""
+        """JSON Schema: an object with arbitrary keys; each value is a string or an array of strings."""
         ids = {"anyOf": [self.text.schema(definitions), self.texts.schema(definitions)]}
         return {"type": "object", "additionalProperties": ids, "maxProperties": _MAX_ID_COUNT}
 
 
 class SizeMap(Reader[dict[str, object]]):
-    """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later."""
+    """A mapping from keys of errors to single sizes. The reader of each key reads the size of that key later.
+
+    The section `specifications` of a mission file is such a mapping. The class reads it without converting the sizes.
+    """
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, object] | Invalid:
         """Return the mapping without converting its sizes; refuse sizes that are lists or mappings."""
@@ -569,16 +625,19 @@ class SizeMap(Reader[dict[str, object]]):
         return INVALID if nested or INVALID in value.values() else value
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object with arbitrary keys, whose values are error sizes given as strings or numbers."""
+        """JSON Schema: an object with arbitrary keys; each value is the size of an error, as a string or a number."""
         size = {"type": ["string", "number"]}
         return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_ID_COUNT}
 
 
 class RegisteredSizes(Reader[dict[str, float]]):
-    """Sizes of errors whose kinds packages register (`error_kinds.register`), by the name of the kind."""
+    """Sizes of errors whose kinds packages register (`error_kinds.register`), by the name of the kind.
+
+    The class reads these sizes as a dictionary of numbers in SI.
+    """
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
-        """Read the size of each registered kind of error; a problem is reported at the path of its kind."""
+        """Read the size of each registered kind of error; a problem is reported at the path of the kind."""
         if not isinstance(value, dict):
             report(path, Problem("must be a mapping of kinds to sizes", f"accepted: {self._accepted()}"))
             return INVALID
@@ -601,12 +660,12 @@ class RegisteredSizes(Reader[dict[str, float]]):
         return ", ".join(motion_kinds()) or "none; no installed package registers a kind of error"
 
     def below(self, step: str) -> Quantity | None:
-        """Reader of the size of a kind of error; None if no package registers the kind."""
+        """Reader of the size of the kind of error `step`; None if no package has registered this kind."""
         kind = motion_kind(step)
         return None if kind is None else _size_of_kind(kind)
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object whose keys are the registered kinds of error, with their sizes."""
+        """JSON Schema: an object whose keys are the registered kinds of error, and whose values are sizes."""
         properties: JsonObject = {
             name: {"description": kind.description, "allOf": [_size_of_kind(kind).schema(definitions)]}
             for name, kind in motion_kinds().items()
@@ -616,7 +675,7 @@ class RegisteredSizes(Reader[dict[str, float]]):
 
 @cache
 def _size_of_kind(kind: MotionKind) -> Quantity:
-    """Reader of the size of an error whose kind a package registers, in the units of the kind."""
+    """Reader of the size of an error of a registered kind, in the units of the kind."""
     return Quantity(kind.dimension, ge=-1e9, le=1e9)
 
 
@@ -625,10 +684,13 @@ _WEIGHED_OR_LISTED: tuple[type[dict[str, object] | list[object]], ...] = (dict, 
 
 
 class Weights(Reader[dict[str, float]]):
-    """Keys of the file with positive weights, or a list of keys with weights of 1."""
+    """Keys of the file with positive weights, or a list of keys with weights of 1.
+
+    The class reads either form as a dictionary of weights by key.
+    """
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:
-        """Read the keys with their weights; a problem is reported at the path of its key or entry."""
+        """Read the keys with their weights; a problem is reported at the path of the key or list entry."""
         if not _is_few(value, _WEIGHED_OR_LISTED, "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
@@ -641,7 +703,7 @@ class Weights(Reader[dict[str, float]]):
         return weights if has_valid_values(weights) else INVALID
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: an object of keys with numbers as weights, or an array of keys."""
+        """JSON Schema: an object of weights by key, or an array of keys."""
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
@@ -654,11 +716,11 @@ class Weights(Reader[dict[str, float]]):
 class Section(Reader[T_co]):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
-    The function `problems(values)` of a `NamedTuple` yields contradictions between the values of its section. It gets
-    the valid values together with the defaults, so that a fault in one value does not hide a contradiction between
-    two valid values. An optional section or list that is valid and empty counts as absent. If the `NamedTuple` has a
-    function `any_of()`, the section must have at least one of the keys that this function returns; `problems` and the
-    schema check this.
+    If the `NamedTuple` has a function `problems(values)`, this function yields contradictions between values of the
+    section. It gets the valid values and the defaults, so that it finds contradictions between valid values even if
+    another value is invalid. An optional section or list that is valid and empty counts as absent. If the
+    `NamedTuple` has a function `any_of()`, the section must have at least one of the keys that this function returns;
+    `problems` and the schema check this.
     """
 
     def __init__(self, kind: Callable[..., T_co]) -> None:
@@ -707,7 +769,7 @@ class Section(Reader[T_co]):
         return self.kind(**values) if is_valid else INVALID
 
     def each(self, value: object) -> dict[str, object]:
-        """Read the value of each known key separately and without reports; invalid values become `INVALID`."""
+        """Read the value of each known key separately; invalid values become `INVALID` without being reported."""
         items = value.items() if isinstance(value, dict) else ()
         return {
             name: read_part(self.keys[name].reader, item, (), _ignore_problem)
@@ -716,11 +778,11 @@ class Section(Reader[T_co]):
         }
 
     def below(self, step: str) -> Reader[object] | None:
-        """Reader of the value of a key; None for an unknown key."""
+        """Reader of the value at the key `step`; None for an unknown key."""
         return self.keys[step].reader if step in self.keys else None
 
     def schema(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema: a reference to the definition of the section, which the first call adds to `definitions`."""
+        """JSON Schema: a reference to the schema of the section, which the first call adds to `definitions`."""
         name = self.kind.__name__
         if name not in definitions:
             definitions[name] = {}  # keeps the order of first use
@@ -728,7 +790,7 @@ class Section(Reader[T_co]):
         return {"$ref": f"#/definitions/{name}"}
 
     def definition(self, definitions: Definitions) -> JsonObject:
-        """JSON Schema of the section: an object with its keys, their descriptions and their defaults."""
+        """JSON Schema of the section: an object whose properties are the keys, with descriptions and defaults."""
         properties = {}
         for name, key in self.keys.items():
             accepted = key.reader.schema(definitions)
@@ -751,7 +813,10 @@ class Section(Reader[T_co]):
 
 
 class ListOf(Reader[tuple[T_co, ...]]):
-    """A list of sections, which all have the same keys, or of which each has one of several forms."""
+    """A list of sections, which all have the same keys, or of which each has one of several forms.
+
+    The class reads such a list as a tuple of sections.
+    """
 
     def __init__(self, kind: "Callable[..., T_co] | Reader[T_co]") -> None:
         self.section: Reader[T_co] = kind if isinstance(kind, Reader) else Section(kind)
@@ -783,7 +848,7 @@ class OneOf(Reader[T_co]):
         self.pick, self.forms = pick, forms
 
     def read(self, value: object, path: KeyPath, report: Report) -> T_co | Invalid:
-        """Read the value with the reader that `pick` returns for it."""
+        """Read the value with the reader that `pick` chooses for it."""
         return self.pick(value).read(value, path, report)
 
     def schema(self, definitions: Definitions) -> JsonObject:
@@ -795,11 +860,17 @@ Points = tuple[tuple[float, float], ...]
 
 
 class SortedPoints(tuple[tuple[float, float], ...]):
-    """Points of a curve in rising order that the file has in another order; rows that use them carry a note."""
+    """Points of a curve in rising order that the file has in another order; rows that use them carry a note.
+
+    The points are (abscissa, ordinate), sorted by ascending abscissa.
+    """
 
 
 class PointsReader(Reader[T_co]):
-    """A mapping of abscissas to ordinates."""
+    """A mapping of abscissas to ordinates.
+
+    The class reads such a mapping as the points of a curve.
+    """
 
     def __init__(self, abscissa: Quantity, ordinate: Quantity, accepted: str, fewest: int) -> None:
         self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
@@ -854,12 +925,15 @@ class CurveReader(PointsReader[Points]):
     """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
 
     def read(self, value: object, path: KeyPath, report: Report) -> Points | Invalid:
-        """Read all points of the curve, sorted by ascending abscissa; a problem is reported at its point."""
+        """Read all points of the curve and sort them by ascending abscissa.
+
+        A problem is reported with the key path of the point in which it occurs.
+        """
         return self.points(value, path, report)
 
 
 def either(kind: type, form: Reader[Form], other: Reader[OtherForm]) -> OneOf[Form | OtherForm]:
-    """Reader of a value with two forms: `form` reads values of the type `kind`, and `other` reads all other values.
+    """Return a reader of values in two forms: `form` reads values of the type `kind`, and `other` reads all others.
 
     `kind` is `list` or `dict`.
     """
@@ -867,24 +941,24 @@ def either(kind: type, form: Reader[Form], other: Reader[OtherForm]) -> OneOf[Fo
 
 
 def is_empty(item: object) -> bool:
-    """Whether an item of a file is an empty section or list, or contains only such empty items."""
+    """Whether an item of a file is an empty section or list, or a section or list that contains only such items."""
     if isinstance(item, dict):
         return all(map(is_empty, item.values()))
     return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_index(step: str) -> bool:
-    """Whether a component of a path consists only of digits, which makes it an index of a list."""
+    """Whether a step of a key path consists only of digits, which makes it the index of an entry in a list."""
     return step.isascii() and step.isdigit() and len(step) < 9
 
 
 def read_part(reader: Reader[T], value: object, path: KeyPath, report: Report) -> T | Invalid:
-    """Read an item of a list or a mapping; an item that is already `INVALID` is returned without a second report."""
+    """Read an item of a list or a mapping; an item that is `INVALID` is returned without being reported again."""
     return INVALID if value is INVALID else reader.read(value, path, report)
 
 
 def are_valid(items: tuple[T | Invalid, ...]) -> TypeGuard[tuple[T, ...]]:
-    """Whether no item of a list is `INVALID`."""
+    """Whether no item of a tuple is `INVALID`."""
     return INVALID not in items
 
 

@@ -1,7 +1,7 @@
-"""Reader of the requirements file of a mission: a CSV with the columns id, text, key and limit.
+"""Reader of the requirements file of a mission: a CSV file with the columns id, text, key and limit.
 
-The values of the file are put into the tree of the mission file, so that the mission is the same as with the keys
-`requirements`, `requirement_ids` and `requirement_texts` in the mission file.
+The values are put into the tree of the mission file. The mission is then the same as if the mission file stated them
+under the keys `requirements`, `requirement_ids` and `requirement_texts`.
 """
 
 import re
@@ -44,7 +44,7 @@ _ACCEPTED_HEADER = f"accepted: a first line with the columns {', '.join(COLUMNS)
 class Cell(NamedTuple):
     """A cell of a CSV file without surrounding blanks, and its line and column, counted from 1 in characters.
 
-    `is_open` tells whether the cell begins with a quotation mark that is not closed at the end of the cell.
+    `is_open` is true if the cell begins with a quotation mark that is not closed at the end of the cell.
     """
 
     text: str
@@ -64,9 +64,9 @@ class RequirementEntry(NamedTuple):
 
 # ---------------------------------------------------------------------- CSV
 def _lines_of(text: str, delimiter: str) -> Iterator[list[Cell]]:
-    """Yield the cells of each line of a CSV file, without the lines in which all cells are blank.
+    """Yield the cells of each line of a CSV file; lines in which all cells are blank are left out.
 
-    A cell in quotation marks may contain delimiters, line breaks, which become blanks, and doubled quotation marks.
+    A cell in quotation marks may contain delimiters, doubled quotation marks, and line breaks, which become blanks.
     """
     blank, end = r"[^\S\r\n]*" if delimiter != "\t" else " *", rf"(?={delimiter}|[\r\n]|\Z)"
     cell_pattern = re.compile(rf'{blank}(?:"((?:[^"]|"")*)"{blank}{end}|([^{delimiter}\r\n]*))')
@@ -102,18 +102,18 @@ class _Faults:
         self.faults: list[Fault] = []
 
     def at(self, cell: Cell, column: str, problem: str, accepted: str = "", hint: str = "", value: str = "") -> None:
-        """Record a fault in a cell; `value` is the faulty content, by default the text of the cell."""
+        """Record a fault in a cell; `value` is the faulty text, by default the whole text of the cell."""
         value = value or shown(cell.text)
         self.faults.append(Fault(cell.line, cell.column, column, problem, value, accepted, hint))
 
     def of(self, cell: Cell, column: str) -> Callable[[KeyPath, Problem], None]:
-        """Return a function that records the problems reported by the reader of a cell as faults of the cell."""
+        """Return a function that records each problem that a reader reports for a cell as a fault of that cell."""
         return lambda _, problem: self.at(cell, column, problem.problem, problem.accepted, problem.hint)
 
 
 @lru_cache(maxsize=16)  # the cases of a sweep read the same file
 def read_requirement_lines(data: bytes, file: str) -> tuple[RequirementEntry, ...]:
-    """Read the lines of a requirements file and check each of them.
+    """Read the lines of a requirements file, and check them.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def read_requirement_lines(data: bytes, file: str) -> tuple[RequirementEntry, ..
 
 
 def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
-    """Indices of the known columns and of a confidence column, by name; all other columns are ignored."""
+    """Indices of the known columns and of a column `confidence`, by name; all other columns are ignored."""
     names = [cell.text.lower() for cell in header]
     for name in (*COLUMNS, _CONFIDENCE):
         if names.count(name) > 1:
@@ -161,7 +161,10 @@ def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
 
 
 def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults: _Faults) -> RequirementEntry | None:
-    """Check a line of the file on its own; returns None if it has a fault."""
+    """Check a line of the file on its own, and return its entry; None if the line has a fault.
+
+    A line whose used cells are all empty also gives None.
+    """
     count = len(faults.faults)
     last = cells[-1]
     behind = Cell("", last.line, last.column + len(last.text))  # stands for cells that the line lacks
@@ -206,19 +209,19 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
 
 
 def _without_apostrophe(cell: Cell) -> Cell:
-    """Remove the apostrophe that protects text from being read as a formula by a spreadsheet, as in `'-30 dB`."""
+    """Remove a leading apostrophe that keeps spreadsheets from reading a cell as a formula, as in `'-30 dB`."""
     return cell._replace(text=cell.text[1:]) if re.match("'[-+=@]", cell.text) else cell
 
 
 def _written(line: RequirementEntry) -> str | list[str]:
-    """Limit of a line in the form that it has in a mission file: a string, or a list of strings for `declare`."""
+    """Limit of a line as it would be in a mission file: a string, or a list of strings for the key `declare`."""
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text
 
 
 def _limit(line: RequirementEntry) -> object:
-    """Limit of a line in SI units, converted by the reader of its key."""
+    """Limit of a line in SI units, as converted by the reader of the key."""
     return _LIMITS[line.key.text].read(_written(line), (), lambda path, problem: None)
 
 
@@ -242,7 +245,8 @@ def add_requirements(tree: Tree, read: Callable[[str], bytes], changes: Sequence
     """Put the values of the requirements file that a mission names into the tree of the mission file.
 
     Values set by options take precedence over values of the requirements file. Faults are recorded in the tree, at
-    the name of the file. `read` takes the name of the file and returns its content, or raises `PathFileError`.
+    the key that names the requirements file. `read` takes the name of the file and returns its content, or raises
+    `PathFileError`.
     """
     requirements = tree.root.get("requirements")
     name = requirements.get("file") if isinstance(requirements, dict) else None
@@ -274,7 +278,7 @@ class _Into:
         self.added: set[KeyPath] = set()
 
     def add(self, line: RequirementEntry) -> None:
-        """Put limit, id and text of a line into the tree; a different value in the mission file is a fault."""
+        """Put the limit, id and text of a line into the tree; it is a fault if the mission file has another value."""
         key, is_limited = line.key.text, line.key.text in _LIMITS
         if is_limited and line.limit.text:
             self._limit(key, line)
@@ -285,7 +289,10 @@ class _Into:
             self._text(line)
 
     def _section(self, name: str) -> dict[str, object] | None:
-        """Section of the tree, added if it is missing; None if it is not a mapping, which its reader reports."""
+        """Section of the tree, which is added if it is missing; None if it is not a mapping.
+
+        The reader of the section reports a value that is not a mapping.
+        """
         section = self.tree.root.setdefault(name, {})
         self.tree.values.setdefault((name,), self.event)
         return section if isinstance(section, dict) else None
@@ -336,14 +343,14 @@ class _Into:
             self._put(path, line.text.text)
 
     def _put(self, path: KeyPath, text: str) -> None:
-        """Record the text of a value, at the position where the mission file names the requirements file."""
+        """Record the text of an added value, at the position of the key that names the requirements file."""
         event = self.event
         if not isinstance(event, Changed):
             event = ScalarEvent(None, None, (True, False), text, event.start_mark, event.end_mark)
         self.tree.values[path] = event
 
     def hold_to_limit(self, line: RequirementEntry) -> None:
-        """Report a requirement in the file if neither the file nor the mission states a limit for it."""
+        """Report a requirement that has a line in the requirements file, but no limit there or in the mission."""
         key = line.key.text
         is_stated = key in self.tree.root["requirements"] or "requirements." + key in self.changed
         if key in _LIMITS and key not in _HAS_DEFAULT and not is_stated:

@@ -1,4 +1,4 @@
-"""A mission file as committed in a git revision, with the files that it uses: parts, settings, orbits, logs."""
+"""A mission file and the files that it uses (parts, settings, orbits, logs), as committed in a git revision."""
 
 import os
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    If the path `near` is in the repository of the current folder, that repository is read, and otherwise the
-    repository that contains the path. A folder that became a submodule only after the revision is therefore read from
+    If the path `near` is in the repository of the current folder, this repository is read; otherwise the repository
+    that contains the path is read. A folder that became a submodule only after the revision is therefore read from
     the enclosing repository. Links are followed within the revision. Submodules are read at the commit that the
     revision records. A file outside the repository is read from the disk; `outside` lists all such files that were
     read.
@@ -95,7 +95,7 @@ class Revision:
         return self._names_by_tree[git_object.hash]
 
     def has(self, file: str) -> bool:
-        """Whether the revision has a file at a path.
+        """Whether the revision contains a file at the path `file`.
 
         Raises `RevisionError` for a link that leads out of the repository, and for a submodule that is not on this
         machine.
@@ -126,9 +126,9 @@ class Revision:
     ) -> list[str]:
         """List the paths of all files in a folder of the revision.
 
-        A submodule or linked folder is entered if the pattern may match files in it. `pattern` is the pattern split
-        at slashes, and `tree` is the git object of the folder. `above` is the path of the folder with a slash at its
-        end. `way` contains the hashes of the parent folders, so that circular links are detected.
+        A submodule or a linked folder is entered only if the pattern may match files in it. `pattern` is the pattern
+        split at slashes, and `tree` is the git object of the folder. `above` is the path of the folder with a slash
+        at its end. `way` contains the hashes of the parent folders, which are used to detect circular links.
         """
         _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
         files = []
@@ -144,16 +144,16 @@ class Revision:
         return files
 
     def path_of(self, file: str) -> str:
-        """Path of a file relative to the top of the repository, with forward slashes.
+        """Path of a file relative to the top folder of the repository, with forward slashes.
 
         The path of a file outside of the repository is returned unchanged.
         """
         return self._inside(file) or file
 
     def _inside(self, path: str) -> str | None:
-        """Path relative to the top of the repository, with forward slashes; None for a path outside of it.
+        """Path relative to the top folder of the repository, with forward slashes; None for a path outside of it.
 
-        Links below the top are not resolved here, because the revision may have other links than the disk.
+        Links inside the repository are not resolved here, because they may differ between the revision and the disk.
         """
         folder, remainder = _existing(path)
         real = os.path.join(os.path.realpath(folder), remainder)
@@ -169,10 +169,10 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """Git object at a path relative to the top of the repository.
+        """Git object at a path relative to the top folder of the repository.
 
-        If the revision has no such file or folder, the `kind` of the object tells why. An object with at most
-        `MAX_BYTES` bytes of content is kept for the next call.
+        If the revision has no such file or folder, the `kind` of the object tells why. The object is kept for the
+        next call if its content has at most `MAX_BYTES` bytes.
         """
         git_object = self._objects.get(inside)
         if git_object is None:
@@ -183,9 +183,9 @@ class Revision:
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a path matches a glob pattern as in `glob.glob`, where `**` matches any number of folders.
+    """Whether a path matches a glob pattern under the rules of `glob.glob`; `**` matches any number of folders.
 
-    Path and pattern are split at slashes.
+    Both the path and the pattern are split at slashes.
     """
     if not pattern:
         return not parts
@@ -197,13 +197,13 @@ def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
 
 
 def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a glob pattern may match files below a folder; pattern and folder are split at slashes."""
+    """Whether a glob pattern may match files below a folder; both are split at slashes."""
     start = pattern[: len(folder)]
     return "**" in start or (len(folder) < len(pattern) and _matches(folder, start))
 
 
 def _top(folder: str) -> tuple[str, str]:
-    """Top folder of the git repository that contains a folder, and a reason why git refuses to read the repository.
+    """Top folder of the git repository that contains `folder`, and the reason if git refuses to read the repository.
 
     The top folder is empty if there is no repository. The reason is empty if git does not refuse.
     """
@@ -252,10 +252,10 @@ def _object(top: str, commit: str, inside: str) -> _Object:
 
 
 def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
-    """Git object at a path that contains a line break, which `cat-file --batch` does not accept.
+    """Git object at a path that contains a line break, which `git cat-file --batch` does not accept.
 
     The object is found by its hash. Links and submodules are not followed. If the path is a link or a submodule, or
-    is below one, the object has the kind of the link or submodule.
+    is inside one, the kind of the object is "symlink" or "submodule".
     """
     parts = inside.split("/")
     for length in range(1, len(parts) + 1):
@@ -278,7 +278,7 @@ def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
 
 
 def _existing(path: str) -> tuple[str, str]:
-    """Nearest folder above a path that exists on the disk, and the remainder of the path."""
+    """Nearest existing folder above a path on the disk, and the remainder of the path."""
     folder, remainder = os.path.split(os.path.abspath(path))
     while not os.path.isdir(folder) and folder != os.path.dirname(folder):
         folder, name = os.path.split(folder)
@@ -287,7 +287,10 @@ def _existing(path: str) -> tuple[str, str]:
 
 
 def _why_not(git_object: _Object) -> str:
-    """Reason why a git object cannot be read as a file, worded to go between the file name and the revision."""
+    """Phrase that tells why a git object cannot be read as a file.
+
+    In a message, the phrase is put between the name of the file and the name of the revision.
+    """
     if git_object.kind == b"symlink":
         return f"is a link out of the repository, to {printable(os.fsdecode(git_object.content))}, in"
     if git_object.kind == b"submodule":
@@ -298,9 +301,9 @@ def _why_not(git_object: _Object) -> str:
 
 
 def mission_at(path: str, revision: Revision, model: str | None = None) -> Mission:
-    """Read a mission file as committed in `revision`, with the parts, settings, orbits and logs of that revision.
+    """Read a mission file as committed in `revision`; parts, settings, orbits and logs are read from it as well.
 
-    `model` replaces the gating model that the file names.
+    `model` is the model that decides the verdicts; it replaces the model that the file names.
 
     Raises
     ------
@@ -321,7 +324,7 @@ def mission_at(path: str, revision: Revision, model: str | None = None) -> Missi
 def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes, str]:
     """Run git in a folder; return whether it succeeded, its output, and the reason for a refusal.
 
-    The reason is empty, unless git refuses to read the repository because it has another owner.
+    The reason is empty unless git refuses to read a repository that belongs to another user.
     """
     # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]

@@ -1,6 +1,7 @@
-"""Combination of missions that differ only in numbers into one mission of arrays, which is evaluated in one pass.
+"""Combination of missions that differ only in numbers into one mission whose numbers are arrays.
 
-A number that differs between the missions becomes an array with one element per mission (case).
+A number that differs between the missions becomes an array with one element per mission (case). The combined mission
+is evaluated in one pass.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -18,7 +19,7 @@ from bisar_budget.mission.readers import SectionValue, SectionValues
 
 
 def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
-    """Select cases of a mission of arrays: each array keeps the elements with the indices `cases`."""
+    """Select cases of a mission whose numbers are arrays; `cases` are the indices of the elements that are kept."""
 
     def of_cases(leaf: object) -> object:
         return leaf[cases] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
@@ -27,12 +28,12 @@ def picked(mission: Mission, cases: NDArray[np.intp]) -> Mission:
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
-    """Combine missions of the same shape into missions of arrays; yield each with the indices of the missions in it.
+    """Combine missions of the same shape, and yield each combined mission with the indices of its original missions.
 
     Missions have the same shape if they differ only in numbers, not in keys, words or lengths of lists. A number that
     differs between the missions becomes an array (missions,); a number that is the same in all missions remains a
     number. The combined mission has no sources and no positions in a file, because calculations with arrays never
-    read them.
+    use them.
     """
     shapes: dict[object, tuple[Mission, list[int], list[list[float]]]] = {}
     for index, mission in enumerate(map(_bare, missions)):
@@ -46,7 +47,7 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
 
 
 def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
-    """Return the next of `numbers` in place of a leaf that is a number; return any other leaf unchanged.
+    """Replace a leaf that is a number by the next element of `numbers`; return any other leaf unchanged.
 
     A leaf is a value that contains no other values.
     """
@@ -54,7 +55,7 @@ def _next_of(numbers: Iterator[PerCase], leaf: object) -> object:
 
 
 def _bare(mission: Mission) -> Mission:
-    """Copy of a mission without its name, file and path sources, which do not affect any calculation."""
+    """Copy of a mission without its name, its file and the sources of its paths, which do not affect calculations."""
     for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
@@ -75,7 +76,7 @@ def _bare(mission: Mission) -> Mission:
 
 
 def _children(value: SectionValue) -> tuple[object, ...] | None:
-    """Values in a section, list or mapping; None for a leaf, which is a number, an array or a word."""
+    """Values in a section, list or mapping; None for a leaf, that is, a number, an array or a word."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, dict):
@@ -84,7 +85,11 @@ def _children(value: SectionValue) -> tuple[object, ...] | None:
 
 
 def _shape(value: SectionValue, numbers: list[float]) -> object:
-    """Shape of a value: its whole content without the numbers, which are appended to `numbers` in order."""
+    """Shape of a value, that is, its whole content except for its numbers.
+
+    The numbers are appended to `numbers` in the order in which they occur. Values with equal shapes differ only in
+    numbers.
+    """
     if isinstance(value, float):
         numbers.append(value)
         return float
@@ -96,7 +101,7 @@ def _shape(value: SectionValue, numbers: list[float]) -> object:
 
 
 def _with_leaves(value: SectionValue, put: Callable[[object], object]) -> SectionValue:
-    """Copy of a value in which each leaf (number, array or word) is replaced by `put(leaf)`."""
+    """Copy of a value in which each number, array or word is replaced by the result of `put` for it."""
     children = _children(value)
     if children is None:
         return put(value)

@@ -1,4 +1,4 @@
-"""YAML as a plain tree with positions: the content of a file before its keys and values are interpreted.
+"""A YAML file as a plain tree with file positions, before its keys and values are interpreted.
 
 The tree is built from the events of the YAML parser, so that its depth is limited before any recursion. Every scalar
 is kept as written in the file, because YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
@@ -41,7 +41,7 @@ NULLS = ("", "~", "null", "Null", "NULL")
 
 
 def _decoded(data: bytes | str, file: str, file_kind: str) -> str:
-    """Decode the content of a file to text; raises `MissionError` if it is too large or not UTF-8."""
+    """Decode the content of a file as UTF-8; raises `MissionError` if it is too large or not UTF-8."""
     if len(data) > MAX_BYTES:
         raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {file_kind} file"),))
     if isinstance(data, str):
@@ -66,16 +66,16 @@ class Tree:
     Attributes
     ----------
     file_kind : str
-        "mission" or "part"; messages about the file as a whole name it.
+        "mission" or "part", for messages about the file as a whole.
     root : dict
-        The content. An unreadable value is reported and becomes `INVALID`.
+        The content. An unreadable value is reported and replaced by `INVALID`.
     keys, values : dict of KeyPath to event
-        The parser's events of the keys and of the values by their paths, with the marks of their start and end.
+        The parser's events for keys and for values, by path. An event has the start and end positions in the file.
     faults : list of Fault
         Faults in the order in which they were found.
     changes : dict of KeyPath to SetValue
-        The options that put values into the tree, each at the highest path that it changed. The values of a sweep are
-        floats.
+        The options that put values into the tree, each under the highest path that it changed. A sweep puts floats
+        into the tree.
     """
 
     def __init__(self, file_kind: str = "mission") -> None:
@@ -94,10 +94,10 @@ class Tree:
         return tree
 
     def fault(self, mark: ParserEvent, path: KeyPath, problem: str, **details: str) -> None:
-        """Record a fault at a mark, which is a position in the file; the default is the start of the file.
+        """Record a fault at the position `mark` in the file; if it is None, the fault is at the start of the file.
 
         If an option set the value at `path`, the fault names the option and has no line. `details` are further fields
-        of the fault. Raises `UnusableError` when the file has `MAX_FAULT_COUNT` faults.
+        of the fault. Raises `UnusableError` as soon as the file has `MAX_FAULT_COUNT` faults.
         """
         change = self._change_at(path)
         if change is not None:
@@ -113,7 +113,7 @@ class Tree:
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
-        """Option that set the value at a path, or a section or list that contains it; None if there is none."""
+        """Option that set the value at `path`, or a section or list that contains it; None if no option did."""
         return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
@@ -121,9 +121,9 @@ class Tree:
         return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
-        """Record a problem that a reader reports as a fault.
+        """Record a problem, which a reader has found, as a fault of the file.
 
-        The fault is located at the value or key at `path`, or at the nearest key above it if the file has neither.
+        The fault is at the value or key at `path`; if the file has neither, it is at the nearest key above.
         """
         path = (*path, *problem.at)
         value: Content = self.root
@@ -141,10 +141,10 @@ class Tree:
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
     def document(self, text: str, path: KeyPath, accepted: str) -> Content:
-        """Read text that consists of a single YAML document into the tree at a path; return `INVALID` for empty text.
+        """Read a single YAML document into the tree at `path`, and return its value; `INVALID` if the text is empty.
 
-        Raises `UnusableError` for a second document, and `yaml.YAMLError` for text that is not YAML. `accepted`
-        describes the accepted content in the message about a second document.
+        Raises `UnusableError` if there is a second document, and `yaml.YAMLError` if the text is not YAML. `accepted`
+        describes the accepted content; it is part of the error message about a second document.
         """
         next_event: Callable[[], ParserEvent] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
@@ -158,7 +158,7 @@ class Tree:
         return value
 
     def node(self, next_event: Callable[[], ParserEvent], event: ParserEvent, path: KeyPath) -> Content:
-        """Read the value that begins with `event`, including all values inside it, and return its content.
+        """Read the value that begins with the parser's event `event`, and all values inside it; return the content.
 
         The depth of the recursion is bounded by `MAX_NESTING_LEVEL`.
         """
@@ -198,10 +198,10 @@ class Tree:
         return value
 
     def _decimal_commas(self, items: list[ParserEvent], path: KeyPath) -> None:
-        """Refuse lists with decimal commas, such as `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`.
+        """Record a fault for a list with decimal commas, such as `[0,5 m, 1 m, 2 m]` or `[0,5 m, 1 m]`.
 
-        YAML reads these as four and as three values. A comma counts as a decimal comma if no blank follows it, but
-        blanks follow the other commas in the list.
+        YAML reads these two lists as four and as three values. A comma counts as a decimal comma if it is not
+        followed by a blank although other commas in the list are.
         """
         commas = []
         for index, (before, item) in enumerate(pairwise(items), start=1):
@@ -221,9 +221,9 @@ class Tree:
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
     def _mapping(self, next_event: Callable[[], ParserEvent], path: KeyPath, *, is_flow: bool) -> dict[str, Content]:
-        """Read the keys and values of a mapping, whose start event has been read already.
+        """Read the keys and values of a mapping whose start event has already been read.
 
-        `is_flow` tells whether the mapping is written in braces.
+        `is_flow` is true if the mapping is written in braces.
         """
         mapping: dict[str, Content] = {}
         split: dict[str, list[str]] = {}  # by key: parts of its value, split at the commas of a flow mapping
@@ -258,9 +258,9 @@ class Tree:
         return mapping
 
     def _without_brackets(self, path: KeyPath, texts: list[str]) -> None:
-        """Refuse a value without brackets, as in `{position: 1 m, 2 m, 3 m}`, which YAML reads as three keys.
+        """Record a fault for a value without brackets, as in `{position: 1 m, 2 m, 3 m}`.
 
-        `texts` are the parts of the value between the commas.
+        YAML reads this as three keys. `texts` are the parts of the value between the commas.
         """
         is_sure = len(texts) == 3 and all(unit_behind(text) or text == "0" for text in texts)
         hint = f"Did you mean [{', '.join(texts)}]?" if is_sure else "A decimal is written with a point"
@@ -270,7 +270,7 @@ class Tree:
 
 
 def _is_bare(key: ParserEvent, item: ParserEvent) -> bool:
-    """Whether a key of a mapping looks like a number, with or without a unit, and has no value."""
+    """Whether a key of a mapping has no value and looks like a number, with or without a unit."""
     is_empty = type(item) is ScalarEvent and not item.style and not item.value
     return is_empty and not key.style and bool(_NUMERAL.match(key.value))
 
@@ -282,7 +282,9 @@ _STARTS = {
 
 
 def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
-    """Read a file with a single YAML document into a tree; `file_kind` is "mission" or "part". Bytes must be UTF-8.
+    """Read a file that contains a single YAML document into a tree; `file_kind` is "mission" or "part".
+
+    If `data` are bytes, they must be UTF-8.
 
     Raises
     ------
@@ -324,7 +326,7 @@ def _copied(value: Content) -> Content:
 
 
 def _dotted(path: KeyPath) -> str:
-    """Format a path, such as `other_errors[0].name`; paths of more than 200 characters are shortened."""
+    """Format a key path as text, such as `other_errors[0].name`; text of more than 200 characters is shortened."""
     text = ""
     for name in path:
         text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else str(name)

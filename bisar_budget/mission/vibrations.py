@@ -1,4 +1,4 @@
-"""Sections of a mission file for vibrations: sinusoids, noise and spectra, of displacement or of acceleration."""
+"""Sections of a mission file for vibrations: sinusoids, noise and spectra, as displacements or accelerations."""
 
 import math
 from collections.abc import Iterator
@@ -32,14 +32,17 @@ _OF_SPEED = "A velocity divided by 2πf is a displacement"
 
 
 class _Displacement(Quantity):
-    """A displacement; its faults tell how to write a vibration that is known by its velocity or acceleration."""
+    """A displacement; its faults tell how to write a vibration that is known by its velocity or acceleration.
+
+    The class reads a displacement from a mission file. Faults are the messages about values that it refuses.
+    """
 
     def __init__(self, of_acceleration: str, also: str = "") -> None:
         super().__init__(units.LENGTH, ge=0, le=1e9)
         self.of_acceleration, self.also = of_acceleration, also
 
     def leaf(self, value: object) -> float:
-        """Read a displacement and check its bounds; a velocity or an acceleration is refused with a hint."""
+        """Read a displacement, and check its bounds; a velocity or an acceleration is refused with a hint."""
         try:
             return super().leaf(value)
         except InvalidValueError as error:
@@ -63,7 +66,7 @@ _ALONG = "along the line of sight; a vector: along each axis"
 
 
 def _of_all(value: float | Vector, number: float) -> float | Vector:
-    """Multiply an amplitude, which is one value along the line of sight or one value per axis, by a number."""
+    """Multiply an amplitude by a number; the amplitude is a value along the line of sight, or one value per axis."""
     if isinstance(value, tuple):
         a, b, c = value
         return a * number, b * number, c * number
@@ -84,22 +87,26 @@ class Sinusoid(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Displacement per unit of the amplitude; 1, because the amplitude is a displacement. [m/m]"""
+        """Displacement per unit of amplitude: 1, because the amplitude is a displacement. [m/m]"""
         return 1.0
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, one value along the line of sight or one value per axis. [m]"""
+        """Amplitude of the displacement: a value along the line of sight, or one value per axis. [m]"""
         return self.amplitude
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, one value along the line of sight or one value per axis. [m/s²]"""
+        """Amplitude of the acceleration: a value along the line of sight, or one value per axis. [m/s²]"""
         return _of_all(self.amplitude, (2 * math.pi * self.frequency) ** 2)
 
 
 class AcceleratedSinusoid(NamedTuple):
-    """One sinusoidal vibration by its acceleration, which is constant if the frequency changes."""
+    """One sinusoidal vibration by its acceleration, which is constant if the frequency changes.
+
+    The file states the amplitude of the acceleration. If a sweep or a search changes the frequency, this amplitude
+    stays the same, so the displacement changes.
+    """
 
     amplitude: Annotated[
         float | Vector, Key(_ACCELERATION_BY_AXIS, f"Amplitude of the acceleration, 0 to peak, {_ALONG}.")
@@ -108,17 +115,17 @@ class AcceleratedSinusoid(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Displacement per unit of the amplitude, which is an acceleration: 1/(2πf)². [s²]"""
+        """Displacement per unit of amplitude: 1/(2πf)², because the amplitude is an acceleration. [s²]"""
         return 1 / (2 * math.pi * self.frequency) ** 2
 
     @property
     def displacement(self) -> float | Vector:
-        """Amplitude of the displacement, one value along the line of sight or one value per axis. [m]"""
+        """Amplitude of the displacement: a value along the line of sight, or one value per axis. [m]"""
         return _of_all(self.amplitude, self.scale)
 
     @property
     def acceleration(self) -> float | Vector:
-        """Amplitude of the acceleration, one value along the line of sight or one value per axis. [m/s²]"""
+        """Amplitude of the acceleration: a value along the line of sight, or one value per axis. [m/s²]"""
         return self.amplitude
 
 
@@ -126,7 +133,10 @@ _SINUSOID, _ACCELERATED = Section(Sinusoid), Section(AcceleratedSinusoid)
 
 
 def _form_of_sinusoid(value: object) -> Reader[Sinusoid | AcceleratedSinusoid]:
-    """Reader of a sinusoid by its acceleration if the amplitude has such a unit, or else by its displacement."""
+    """Return the reader for a sinusoid.
+
+    If the amplitude has a unit of acceleration, the reader makes an `AcceleratedSinusoid`, otherwise a `Sinusoid`.
+    """
     amplitude = value.get("amplitude") if isinstance(value, dict) else None
     components = amplitude if isinstance(amplitude, list) else [amplitude]
     is_accelerated = any(isinstance(text, str) and given_unit(text, units.ACCELERATION.si) for text in components)
@@ -145,21 +155,24 @@ class Wideband(NamedTuple):
 class Spectrum(NamedTuple):
     """One-sided spectral density of a vibration: straight over logarithms between its points, zero outside of them.
 
-    `points` are frequencies [Hz] with their densities. If `is_accelerated`, these are densities of acceleration
-    [(m/s²)²/Hz], and otherwise of displacement [m²/Hz].
+    `points` are pairs of frequency [Hz] and density. If `is_accelerated`, the densities are of acceleration
+    [(m/s²)²/Hz], otherwise of displacement [m²/Hz].
     """
 
     points: Points
     is_accelerated: bool
 
     def times(self, power: PerCase) -> "Spectrum":
-        """Copy of the spectrum with each density multiplied by `power`, a ratio of powers."""
+        """Copy of the spectrum in which each density is multiplied by the power ratio `power`."""
         points: SectionValue = tuple((f, density * power) for f, density in self.points)
         return self._replace(points=points)
 
 
 class _SpectrumReader(PointsReader[Spectrum]):
-    """A mapping of frequencies to densities, all of acceleration or all of displacement."""
+    """A mapping of frequencies to densities, all of acceleration or all of displacement.
+
+    The class reads such a mapping from a mission file, and makes a `Spectrum` from it.
+    """
 
     def __init__(self, dimension: Dimension, example: str) -> None:
         frequency = Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e9)
@@ -167,7 +180,7 @@ class _SpectrumReader(PointsReader[Spectrum]):
         self.is_accelerated = dimension is units.ACCELERATION_DENSITY
 
     def read(self, value: object, path: KeyPath, report: Report) -> Spectrum | Invalid:
-        """Read the points as a spectrum of acceleration or displacement."""
+        """Read the points, and return them as a spectrum of acceleration or displacement."""
         points = self.points(value, path, report)
         return INVALID if points is INVALID else Spectrum(points, self.is_accelerated)
 
@@ -179,9 +192,10 @@ _SPECTRA = (
 
 
 def _form_of_spectrum(value: object) -> Reader[Spectrum]:
-    """Reader of a displacement spectrum if more points have units of displacement than of acceleration.
+    """Return the reader for a spectrum, chosen by the units of its points.
 
-    Otherwise it is the reader of an acceleration spectrum.
+    If more points have units of displacement than of acceleration, the reader makes a displacement spectrum,
+    otherwise an acceleration spectrum.
     """
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
@@ -218,7 +232,7 @@ class Vibration(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a vibration. An amplitude of zero counts as stated."""
+        """Whether the file states a vibration; an amplitude of zero counts as stated."""
         return bool(self.sinusoidal) or self.wideband is not None or self.spectrum is not None
 
 
@@ -238,7 +252,7 @@ class FeltVibration(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states a vibration. An amplitude of zero counts as stated."""
+        """Whether the file states a vibration; an amplitude of zero counts as stated."""
         return bool(self.sinusoidal) or self.spectrum is not None
 
 

@@ -1,4 +1,4 @@
-"""State of the git repository around a mission file: its commit, and whether its files are as committed."""
+"""State of the git repository that contains a mission file: its commit, and which files differ from the commit."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,9 @@ _GIT_COMMAND = (
 class WorkTree(NamedTuple):
     """The commit that is checked out in the git repository of a mission, and files that differ from it.
 
-    `commit` is the hash of the commit; empty if there is none, and `reason` is then the sentence that says why.
-    `changed` are the committed files of the repository with changes. Among the inputs of the mission,
-    `changed_inputs` are those with changes, and `new_inputs` those that were never committed.
+    `commit` is the hash of the commit. It is empty if there is no commit; `reason` then tells why. `changed` lists
+    the changed files of the repository. Of the files that the mission reads, `changed_inputs` lists the changed
+    files, and `new_inputs` lists the files that were never committed.
     """
 
     commit: str = ""
@@ -30,7 +30,7 @@ class WorkTree(NamedTuple):
 
     @property
     def is_clean(self) -> bool:
-        """Whether there is a commit from which no committed file and no input differs."""
+        """Whether there is a commit, and all committed files and all inputs of the mission are as committed."""
         return bool(self.commit) and not self.changed and not self.new_inputs
 
 
@@ -39,10 +39,10 @@ _NOT_IN_REPOSITORY = WorkTree(reason="not in a git repository")
 
 
 def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
-    """Return the states of the git repositories of mission files, by the paths of the files.
+    """Return the state of the git repository of each mission file, by the path of the file.
 
     `inputs` maps the path of each mission file to the paths of the other files that it reads. All paths are absolute
-    or relative to the current folder. `-` is standard input, which is in no repository.
+    or relative to the current folder. `-` means standard input, which is in no repository.
     """
     states: dict[str, WorkTree] = {}
     tops: dict[str, str] = {}
@@ -64,7 +64,7 @@ def work_trees(inputs: Mapping[str, Sequence[str]]) -> dict[str, WorkTree]:
 
 
 def _state(top: str) -> WorkTree:
-    """State of the repository with the top folder `top`, without inputs of a mission."""
+    """State of the repository with the top folder `top`; the inputs of the mission are not considered."""
     is_read, commit = _git(top, "rev-parse", "--verify", "--quiet", "HEAD^{commit}")
     if not is_read:
         return WorkTree(reason=commit or "in a git repository without a commit")
@@ -75,7 +75,7 @@ def _state(top: str) -> WorkTree:
 
 
 def _with_inputs(state: WorkTree, top: str, files: Sequence[str]) -> WorkTree:
-    """Return the state of a repository with the inputs `files` of a mission, as far as they are in its folder.
+    """Add the inputs `files` of a mission to the state of its repository; files outside the repository are ignored.
 
     A file that was only added to the index counts as changed.
     """
@@ -95,7 +95,7 @@ def _with_inputs(state: WorkTree, top: str, files: Sequence[str]) -> WorkTree:
 
 
 def _is_below_git(folder: str) -> bool:
-    """Whether a folder or a folder above it has a `.git`, so that git need not be run where there is none."""
+    """Whether a folder, or a folder above it, contains `.git`. If not, git need not be run."""
     while not os.path.lexists(os.path.join(folder, ".git")):
         above = os.path.dirname(folder)
         if above == folder:
@@ -105,7 +105,7 @@ def _is_below_git(folder: str) -> bool:
 
 
 def _git(folder: str, *arguments: str) -> tuple[bool, str]:
-    """Run git in a folder; returns whether it succeeded, and its output or the reason why it cannot be read."""
+    """Run git in a folder; return whether it succeeded, and its output, or the reason why git could not be run."""
     from subprocess import TimeoutExpired, run  # a check to a terminal does not need it
 
     variables = {name: value for name, value in os.environ.items() if name not in VARIABLES_OF_HOOKS}

@@ -1,7 +1,8 @@
-"""Accuracy of a path as its source states it: covariances, sigmas of axes, or only the size of the total error.
+"""Accuracy of a path as stated by its source: covariances, sigmas along axes, or only the size of the total error.
 
-An ephemeris states covariances at epochs. Along the orbit's axes (radial, in-track, cross-track) a covariance changes
-little from one epoch to the next. So it is interpolated along these axes, and then converted to Earth-fixed axes.
+An ephemeris states covariances at epochs. Along the axes of the orbit (radial, in-track, cross-track) a covariance
+changes little from one epoch to the next. It is therefore interpolated along these axes, and then converted to
+Earth-fixed axes.
 """
 
 import math
@@ -28,7 +29,7 @@ _VELOCITY_STEP_S = 0.5
 
 
 class StatedAccuracy(NamedTuple):
-    """One-sigma error of a path as its source states it.
+    """1-sigma error of a path as stated by its source.
 
     Attributes
     ----------
@@ -40,7 +41,7 @@ class StatedAccuracy(NamedTuple):
     total : float
         Total position error, if the source states only its size and no covariance. [m]
     is_typical : bool
-        True if the source states only the quality of its fixes. The error is then a typical error for this quality.
+        True if the source states only the quality of its fixes. The error is then typical of fixes of this quality.
     """
 
     words: str
@@ -50,7 +51,7 @@ class StatedAccuracy(NamedTuple):
 
     @property
     def position_m(self) -> float:
-        """Total position error: root sum of squares over the three axes, or `total` if there is no covariance. [m]"""
+        """Total position error: root sum of squares over three axes, or `total` if there is no covariance. [m]"""
         variances = (
             [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
         )
@@ -61,7 +62,7 @@ class PathNoise(NamedTuple):
     """Error of a path due to the noise of its log, as polynomials of slow time over the aperture.
 
     `modes` (modes, orders, 3) are the polynomial coefficients, in ascending powers of slow time. [m], [m/s], … Each
-    mode is a one-sigma error along one axis of the scene, and is independent of all other modes. Terms above order 8
+    mode is a 1-sigma error along one axis of the scene, and is independent of all other modes. Terms above order 8
     are neglected.
     """
 
@@ -69,11 +70,11 @@ class PathNoise(NamedTuple):
 
 
 class CovarianceError(ValueError):
-    """Raised for a matrix that cannot be a covariance."""
+    """A matrix cannot be a covariance; the message tells why."""
 
 
 def as_matrix(values: Floats) -> Matrix:
-    """Make an array (n, n) exactly symmetric, and convert it to tuples of Python numbers."""
+    """Make an array (n, n) exactly symmetric, and convert it to nested tuples of Python numbers."""
     return tuple(tuple(float(value) for value in row) for row in (values + values.T) / 2)
 
 
@@ -83,7 +84,7 @@ def as_rows(values: Floats) -> Matrix:
 
 
 def diagonal(variances: Sequence[float]) -> Matrix:
-    """Covariance matrix of independent errors, from their variances."""
+    """Covariance matrix of independent errors with the given variances."""
     return as_matrix(np.diag(np.asarray(variances, dtype=float)))
 
 
@@ -94,7 +95,7 @@ def block_turned(covariance: Floats, axes: Floats) -> Floats:
 
 
 def correlations(covariance: Floats) -> Matrix:
-    """Correlation matrix from a covariance matrix (n, n).
+    """Correlation matrix of a covariance matrix (n, n).
 
     An error with zero variance has the correlation 0 with all other errors.
     """
@@ -106,10 +107,11 @@ def correlations(covariance: Floats) -> Matrix:
 
 
 def covering_sigmas(covariance: Floats) -> Vector:
-    """Sigmas (3,) of independent errors along three axes, chosen to cover a covariance (3, 3). [m], [m/s]
+    """Sigmas (3,) of independent errors along three axes, large enough to cover a covariance (3, 3). [m], [m/s]
 
-    In every direction, their variance is at least that of the covariance. For a diagonal covariance, the result is
-    the square root of its diagonal. Otherwise the sigmas are larger by a factor of up to √3.
+    In every direction, the variance of these errors is at least as large as the variance given by the covariance. For
+    a diagonal covariance, the sigmas are the square roots of its diagonal. Otherwise they are larger by a factor of
+    up to √3.
     """
     largest = float(np.linalg.eigvalsh(np.array(correlations(covariance)))[-1])
     factor = math.sqrt(largest) if largest > 1 + _EQUAL_VARIANCE_FRACTION else 1.0
@@ -118,7 +120,7 @@ def covering_sigmas(covariance: Floats) -> Vector:
 
 
 def held_to_covariance(values: Floats) -> Floats:
-    """Make a covariance matrix positive semi-definite if it fails to be so only because of rounding errors.
+    """Correct rounding errors of a covariance matrix that keep it from being positive semi-definite.
 
     Raises
     ------
@@ -139,15 +141,15 @@ def held_to_covariance(values: Floats) -> Floats:
 
 # ---------------------------------------------------------------------- covariances of an orbit
 def turns_with_orbit(name: str) -> bool:
-    """Whether the CCSDS name of orbit axes ends with `_ROTATING`.
+    """Whether velocities in the axes with the CCSDS name `name` are relative to axes that rotate with the orbit.
 
-    Velocities are then relative to axes that rotate with the orbit.
+    The names of such axes end with `_ROTATING`.
     """
     return name.endswith("_ROTATING")
 
 
 def local_axes(name: str) -> str | None:
-    """Convert the CCSDS name of axes that follow an orbit to `RTN` or `TNW`; None for the name of any other axes."""
+    """Convert the CCSDS name of axes that follow an orbit to `RTN` or `TNW`; None for any other axes."""
     for suffix in _AXES_SUFFIXES:
         name = name.removesuffix(suffix)
     name = _AXES_SYNONYMS.get(name, name)
@@ -156,12 +158,12 @@ def local_axes(name: str) -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class EpochCovariance:
-    """Covariance (6, 6) of position and velocity at an epoch of TAI. [m², m²/s, m²/s²]
+    """Covariance (6, 6) of position and velocity at an epoch in TAI. [m², m²/s, m²/s²]
 
     `axes` is the name of the axes: `RTN` or `TNW` for axes of the orbit, `earth` for Earth-fixed axes, or `stars` for
-    celestial axes, which `turn` converts to Earth-fixed axes. None means that the axes are unknown. Then only the
-    total position variance is used. With `RTN` or `TNW`, velocities are inertial, or relative to axes that rotate
-    with the orbit if `is_rotating` is set.
+    celestial axes, which `turn` converts to Earth-fixed axes. If `axes` is None, the axes are unknown, and only the
+    total position variance is used. With `RTN` or `TNW`, velocities are relative to axes that rotate with the orbit
+    if `is_rotating` is set, and inertial otherwise.
     """
 
     epoch: Instant
@@ -172,10 +174,7 @@ class EpochCovariance:
 
 
 class OrbitState(NamedTuple):
-    """Position [m] and inertial velocity [m/s] of a satellite.
-
-    Both are components along Earth-fixed axes.
-    """
+    """Position [m] and inertial velocity [m/s] of a satellite, both as components along Earth-fixed axes."""
 
     position: Vector
     velocity: Vector
@@ -183,7 +182,7 @@ class OrbitState(NamedTuple):
     def axes(self, name: str) -> Floats:
         """Unit vectors of the axes `RTN` (radial, in-track, cross-track) or `TNW` (velocity, in-plane, cross-track).
 
-        The vectors are the rows of the result (3, 3). Their components are along Earth-fixed axes.
+        The vectors are the rows of the result (3, 3), given as components along Earth-fixed axes.
         """
         position, velocity = np.array(self.position), np.array(self.velocity)
         across = np.cross(position, velocity)
@@ -192,7 +191,7 @@ class OrbitState(NamedTuple):
         return np.array((first, np.cross(across, first), across))
 
     def rate(self, name: str) -> float:
-        """Inertial rate at which the axes `RTN` or `TNW` rotate about the orbit normal. [rad/s]"""
+        """Inertial angular rate at which the axes `RTN` or `TNW` rotate about the orbit normal. [rad/s]"""
         position, velocity = np.array(self.position), np.array(self.velocity)
         momentum = float(np.linalg.norm(np.cross(position, velocity)))
         if name == "RTN":
@@ -203,9 +202,10 @@ class OrbitState(NamedTuple):
 
 
 def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: tuple[Instant, Instant]) -> OrbitState:
-    """Position and inertial velocity of a satellite at an instant, from the Earth-fixed positions on its orbit.
+    """Position and inertial velocity of a satellite at an instant, computed from Earth-fixed positions.
 
-    The velocity is computed from a central difference of positions within the span of the orbit.
+    The velocity is a central difference of positions. `position_at` returns the Earth-fixed position at an instant
+    within `span`, the first and last instant of the orbit.
     """
     first = max(instant.after(-_VELOCITY_STEP_S), span[0])
     last = min(instant.after(_VELOCITY_STEP_S), span[1])
@@ -217,7 +217,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 
 
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
-    """Convert the velocities of a covariance (6, 6) to axes with a different rotation: δv becomes δv + rate × δr.
+    """Convert the velocities of a covariance (6, 6) to axes that rotate differently: δv becomes δv + rate × δr.
 
     `rate` (3,) is the angular rate of the old axes relative to the new axes. [rad/s]
     """
@@ -236,11 +236,11 @@ def stated_of_orbit(
     instant: Instant,
     span: tuple[Instant, Instant],
 ) -> StatedAccuracy | None:
-    """Accuracy of an ephemeris at an instant, along Earth-fixed axes, from the covariances that its file states.
+    """Accuracy of an ephemeris at an instant, along Earth-fixed axes, from the covariances in its file.
 
-    Between two epochs the covariance is interpolated linearly along the orbit's axes. Before the first and after the
-    last epoch, the covariance of the nearest epoch is used. A covariance of zero counts as missing. Returns None if
-    no covariance is stated. `place` is a function that returns the Earth-fixed position [m] at an instant.
+    Between two epochs the covariance is interpolated linearly along the axes of the orbit. Before the first and after
+    the last epoch, the covariance of the nearest epoch is used. A covariance of zero counts as missing. The result is
+    None if no covariance is stated. The function `place` returns the Earth-fixed position [m] at an instant.
     """
     nonzero = (covariance for covariance in covariances if np.trace(covariance.values[:3, :3]) > 0)
     stated = sorted(nonzero, key=lambda covariance: covariance.epoch)
@@ -271,7 +271,7 @@ def stated_of_orbit(
 
 
 def _covariance_along_orbit(covariance: EpochCovariance, state: OrbitState, instant: Instant) -> Floats:
-    """Convert a covariance to radial, in-track and cross-track axes, with inertial velocities."""
+    """Convert a covariance to radial, in-track and cross-track axes; velocities become inertial velocities."""
     if covariance.axes in LOCAL_AXES:
         values = covariance.values
         if covariance.is_rotating:

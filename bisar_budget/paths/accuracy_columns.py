@@ -1,7 +1,7 @@
-"""Names of columns that state the accuracy of the positions beside them.
+"""Names of the columns in a log that state the accuracy of its positions.
 
-Programs use many names for such columns: `sigma_east`, `sde`, `SD-E`, `lat std dev`, `hAcc`, `cov_ee`. A column that
-looks like an accuracy is read if its name states an axis or direction of the position. It is ignored if its name
+Programs use many names for such columns: `sigma_east`, `sde`, `SD-E`, `lat std dev`, `hAcc`, `cov_ee`. A column whose
+name looks like an accuracy is read if the name states an axis or direction of the position. It is ignored if the name
 states another quantity, such as a velocity. Any other column that looks like an accuracy is refused: if it were
 ignored, the error that the log declares could be too small.
 """
@@ -105,12 +105,13 @@ _COLUMN_SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """Find the accuracy that a column states, from its name and unit; return its standard name and unit.
+    """Find out from the name and unit of a column which accuracy it states; return the standard name and unit.
 
-    The standard name is `sigma_east` or `variance_east`, or the same for another axis. It is `horizontal_accuracy` or
-    `vertical_accuracy`, and `position_accuracy` for an accuracy without a direction. It is `sigma_h` if h may mean
-    height or horizontal, which is then decided from the other columns. It is `CROSS_COVARIANCE` for a covariance of
-    two axes, `UNCLEAR` for an unknown accuracy, and None for a column that does not state the accuracy of a position.
+    Standard names are `sigma_east`, `variance_east` and the same for other axes, `horizontal_accuracy`,
+    `vertical_accuracy`, and `position_accuracy` for an accuracy without a direction. The name is `sigma_h` if h may
+    mean height or horizontal, which is decided later from the other columns. It is `CROSS_COVARIANCE` for a
+    covariance of two axes, `UNCLEAR` for an unknown accuracy, and None for a column that does not state the accuracy
+    of a position.
 
     The returned unit is `unit`, or else the unit at the end of the column's name, or None.
     """
@@ -143,7 +144,7 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """Standard name of an accuracy, as in `meaning_of`, from the words in the name of its column.
+    """Standard name of an accuracy, as in `meaning_of`, from the words of a column name.
 
     Returns None if the name does not look like an accuracy.
     """
@@ -183,7 +184,7 @@ def _of_tokens(tokens: Sequence[str]) -> str | None:
 
 
 def _of_variance(axis_tokens: Sequence[str]) -> str:
-    """Standard name of a variance or covariance column, from its axes such as `ee`, `e`, `e e` or `east`.
+    """Standard name of a variance or covariance column, from the words for its axes: `ee`, `e`, `e e` or `east`.
 
     The result is `UNCLEAR` if the axes are not known.
     """
@@ -201,7 +202,7 @@ def _of_variance(axis_tokens: Sequence[str]) -> str:
 
 
 def _is_cross(token: str) -> bool:
-    """Whether a word consists of the initials of two different axes among east, north, up and down, as in `en`."""
+    """Whether a word consists of the initials of two different directions (east, north, up, down), such as `en`."""
     return re.fullmatch(r"[enud]{2}", token) is not None and token[0] != token[1]
 
 
@@ -211,7 +212,7 @@ def _is_velocity(tokens: Sequence[str]) -> bool:
 
 
 def _may_be_of_positions(meaning: str, unit: str) -> bool:
-    """Whether a column with this unit may be the accuracy of a position.
+    """Whether a column with the unit `unit` may state the accuracy of a position.
 
     `meaning` is the standard name of the accuracy. The result is true for a unit of length or area, and for an
     unknown unit. It is also true for a unit of angle, except for accuracies that cannot be angles, such as a vertical

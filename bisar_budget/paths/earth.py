@@ -1,4 +1,4 @@
-"""The Earth as the WGS-84 ellipsoid: geodetic coordinates, and the axes of a scene on the ground.
+"""The WGS-84 ellipsoid: geodetic coordinates, and the axes of a scene on the ground.
 
 The Earth-fixed x axis points to Greenwich on the equator, and the z axis to the north pole. Coordinates are in m.
 """
@@ -38,7 +38,7 @@ class Geodetic(NamedTuple):
 
 @dataclass(frozen=True)
 class SceneAxes:
-    """Axes of a scene: origin [m], and unit vectors east, north and up at the origin, in Earth-fixed coordinates."""
+    """Axes of a scene: the origin [m], and unit vectors east, north and up at the origin, in Earth-fixed axes."""
 
     origin: Vector
     axes: Axes
@@ -85,7 +85,7 @@ class SceneAxes:
 
         The radial axis points away from the Earth's centre. The cross-track axis is normal to the position and to the
         inertial velocity v + ω×r, where v is the velocity in Earth-fixed axes, ω the Earth's rotation rate and r the
-        position. The in-track axis completes the frame. On an eccentric orbit it differs slightly from the direction
+        position. The in-track axis completes the frame. On an eccentric orbit, it differs slightly from the direction
         of the velocity (CCSDS 502.0-B, RTN).
         """
         r = self.earth_fixed(position)
@@ -113,9 +113,10 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
 
     Notes
     -----
-    Derived here. With `axes` the acceleration is −∇U − 2ω×v − ω×(ω×r). The vector r from the Earth's centre is given
-    in axes that rotate at the rate ω, and v is its rate of change in these axes. The potential of a flattened Earth
-    is −U = (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without `axes` the acceleration is −μr/r³.
+    The formulas were derived for this program. With `axes` the acceleration is −∇U − 2ω×v − ω×(ω×r). The vector r
+    from the Earth's centre is given in axes that rotate at the rate ω, and v is its rate of change in these axes. The
+    potential of a flattened Earth is −U = (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without `axes` the acceleration is
+    −μr/r³.
     """
     if axes is None:
         x, y, up = position
@@ -140,7 +141,7 @@ def free_fall(position: Vectors, velocity: Vectors, axes: SceneAxes | None) -> V
 def earth_fixed_places(latitude: PerCase, longitude: PerCase, height: PerCase) -> Floats:
     """Earth-fixed coordinates (..., 3) of geodetic positions. [m]
 
-    Latitude [rad], longitude [rad] and height [m] are each (...).
+    Latitude [rad], longitude [rad] and height [m] are arrays of the shape (...).
     """
     sine, cosine = np.sin(latitude), np.cos(latitude)
     _, normal = curvature_radii(sine)
@@ -150,27 +151,30 @@ def earth_fixed_places(latitude: PerCase, longitude: PerCase, height: PerCase) -
 
 
 def earth_fixed(position: Geodetic) -> Vector:
-    """Earth-fixed coordinates of a geodetic position, or of positions of many cases. [m]"""
+    """Earth-fixed coordinates of a geodetic position, whose components may be arrays (cases,). [m]"""
     return _vector(earth_fixed_places(*np.broadcast_arrays(*position)))
 
 
 def _vector(coordinates: Floats) -> Vector:
-    """Convert coordinates (3,) to three numbers, or coordinates (cases, 3) to three arrays (cases,)."""
+    """Convert an array (3,) to three numbers, or an array (cases, 3) to three arrays (cases,)."""
     x, y, z = (coordinate if coordinate.ndim else coordinate.item() for coordinate in np.moveaxis(coordinates, -1, 0))
     return (x, y, z)
 
 
 def curvature_radii(sine: PerCase) -> tuple[PerCase, PerCase]:
-    """Radii of curvature of the ellipsoid along the meridian and across it, from the sine of the latitude. [m]"""
+    """Radii of curvature of the ellipsoid along the meridian and across it. [m]
+
+    `sine` is the sine of the latitude.
+    """
     across = EQUATORIAL_RADIUS_M / np.sqrt(1 - _SQUARED_ECCENTRICITY_RATIO * sine * sine)
     return across**3 * (1 - _SQUARED_ECCENTRICITY_RATIO) / EQUATORIAL_RADIUS_M**2, across
 
 
 def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
-    """Latitude [rad], longitude [rad] and height [m], each (...), of Earth-fixed coordinates (..., 3).
+    """Geodetic latitude [rad], longitude [rad] and height [m] of Earth-fixed coordinates (..., 3).
 
-    Bowring's iteration on the reduced latitude is used. It is valid for positions more than a few kilometres from the
-    Earth's centre.
+    Each result has the shape (...). Bowring's iteration on the reduced latitude is used. It is valid for positions
+    more than a few kilometres from the Earth's centre.
     """
     x, y, z = np.moveaxis(points, -1, 0)
     level = np.hypot(x, y)
@@ -195,16 +199,16 @@ def geodetic_places(points: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def geodetic(point: Vector) -> Geodetic:
-    """Geodetic latitude, longitude and height of a point in Earth-fixed coordinates (3,) [m]."""
+    """Geodetic latitude [rad], longitude [rad] and height [m] of a point with Earth-fixed coordinates [m]."""
     latitude, longitude, height = map(float, geodetic_places(np.array(point)))
     return Geodetic(latitude, longitude, height)
 
 
 def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
-    """Unit vectors to the east, north and up at geodetic positions, in Earth-fixed axes.
+    """Unit vectors east, north and up at geodetic positions, in Earth-fixed axes.
 
-    Latitude and longitude are (...) in radians. The result (3, ..., 3) is indexed by direction, position and
-    component.
+    Latitude and longitude are arrays of the shape (...), in radians. The axes of the result (3, ..., 3) are
+    direction, position and component.
     """
     sine, cosine, zero = np.sin(latitude), np.cos(latitude), np.zeros_like(longitude)
     sine_l, cosine_l = np.sin(longitude), np.cos(longitude)
@@ -217,14 +221,14 @@ def _directions(latitude: PerCase, longitude: PerCase) -> Floats:
 def axes_at_places(latitude: Floats, longitude: Floats) -> Floats:
     """Unit vectors east, north and up at n geodetic positions, in Earth-fixed axes.
 
-    `latitude` and `longitude` are (n,). [rad] The result (3, 3, n) is indexed by direction, Earth-fixed component and
-    position.
+    `latitude` and `longitude` are arrays (n,) in radians. The axes of the result (3, 3, n) are direction, Earth-fixed
+    component and position.
     """
     return np.ascontiguousarray(np.moveaxis(_directions(latitude, longitude), -1, 1))
 
 
 def axes_at(position: Geodetic) -> SceneAxes:
-    """Axes of a scene whose origin is a geodetic position; coordinates may be arrays (cases,)."""
+    """Axes of a scene whose origin is a geodetic position; the coordinates may be arrays (cases,)."""
     east, north, up = map(_vector, _directions(*np.broadcast_arrays(position.latitude, position.longitude)))
     return SceneAxes(earth_fixed(position), (east, north, up))
 
@@ -239,7 +243,7 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
     heading : float
         Heading at time 0, clockwise from north. [rad]
     speed : float
-        Horizontal speed at the flown height. [m/s]
+        Horizontal speed at the height of flight. [m/s]
     climb : float
         Vertical speed. [m/s]
     times_s : (...) array_like
@@ -247,18 +251,18 @@ def flown(position: Geodetic, heading: float, speed: float, climb: float, times_
 
     Notes
     -----
-    Derived here. The direction of flight rotates only with the normal of the ellipsoid, at a rate equal to the speed
-    divided by the radius of curvature, which follows from Euler's formula. The fourth-order Runge-Kutta method
-    integrates in Earth-fixed axes, where the poles need no special treatment.
+    The method was derived for this program. The direction of flight rotates only with the normal of the ellipsoid.
+    Its rate of rotation is the speed divided by the radius of curvature, which follows from Euler's formula. The
+    fourth-order Runge-Kutta method integrates in Earth-fixed axes, where the poles need no special treatment.
     """
     axes = axes_at(position)
     start = np.array(axes.origin)
     step = np.asarray(times_s, dtype=float)[..., None] / _RUNGE_KUTTA_STEPS
 
     def rates(state: Floats) -> Floats:
-        """Rates of change (2, ..., 3) of the state.
+        """Rates of change (2, ..., 3) of the state of the flight.
 
-        The state is the displacement from the start [m] and the unit vector of the direction of flight.
+        The state consists of the displacement from the start [m] and the unit vector of the direction of flight.
         """
         displacement, direction = state
         latitude, longitude, height = geodetic_places(start + displacement)

@@ -2,13 +2,13 @@
 
 The error of a position from SGP4 is about 1 km at the epoch of the elements, and grows by 1 to 3 km with each day
 from the epoch (documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA
-2006-6753). The constants of WGS-72 are used, because the elements are made with them. The mean sidereal time of 1982
-is used to rotate positions from the true equator and mean equinox of date to Earth-fixed axes.
+2006-6753). The constants of WGS-72 are used, because the elements are made with them. Positions are rotated from the
+true equator and mean equinox of date to Earth-fixed axes with the mean sidereal time of 1982.
 
 Two-line sets follow Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5 catalogue
-numbers. Messages follow CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and CSV use the
-keywords of the message. In JSON and CSV, CelesTrak leaves out keywords that can have only one value; Space-Track
-writes all keywords.
+numbers. Messages follow CCSDS 502.0-B: they are text with keywords and values, XML, JSON or CSV. JSON and CSV use the
+same keywords. In these two formats, CelesTrak leaves out keywords that can have only one value; Space-Track writes
+all keywords.
 """
 
 import csv
@@ -65,7 +65,7 @@ _FAILURES = {
 class Elements:
     """Mean elements of an object at an epoch, in the units of SGP4: angles in rad, mean motion in rad/min.
 
-    `covariance` is the covariance of position and velocity at the epoch, if the message states it.
+    `covariance` is the covariance of position and velocity at the epoch, or None if the file does not state it.
     """
 
     name: str
@@ -89,13 +89,13 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name and catalogue number, in the form that is compared with the name in a mission."""
+        """Name and catalogue number of the object, normalised for comparison with the name in a mission."""
         return (object_key(self.name), str(self.number))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrokenEntry:
-    """An unusable entry of a catalogue: the reason, and the names of the object as far as they could be read."""
+    """An unusable entry of an orbit file: the reason, and the names of the object as far as they could be read."""
 
     problem: str
     names: tuple[str, ...] = ()
@@ -106,15 +106,15 @@ Entry = Elements | BrokenEntry
 
 
 def teme(elements: Elements) -> Callable[[Instant], Vector]:
-    """Return a function that computes the position of an object at an instant by SGP4. [m]
+    """Return a function that computes the position of an object at an instant with SGP4. [m]
 
-    The axes are those of the true equator and mean equinox of date (TEME).
+    The axes are the true equator and mean equinox of date (TEME).
 
     Raises
     ------
     PathFileError
-        The package sgp4 is not installed, or refuses the elements. The returned function raises it for an instant at
-        which SGP4 has no position.
+        The package sgp4 is not installed, or refuses the elements. The returned function raises this error for an
+        instant for which SGP4 has no position.
     """
     try:
         from sgp4.api import WGS72, Satrec
@@ -149,13 +149,13 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
 
 
 def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
-    """Return a smooth version of `place`, a function from an instant to a position, without rounding steps. [m]
+    """Return a smooth version of `place`, a function that returns the position at an instant. [m]
 
-    These steps grow with the time from the epoch of the elements. SGP4 counts minutes and angles from the epoch,
-    so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100 days from the epoch. A polynomial of
-    slow time would follow these steps, and so curve the path. Instead, Lagrange's polynomial goes through eight
-    positions 30 s apart. Its error in a low orbit is 1e-8 m, from its remainder term. It also smooths the jumps of a
-    few millimetres that SGP4 makes every half day in resonant orbits.
+    Positions from SGP4 have rounding steps, which grow with the time from the epoch of the elements. SGP4 counts
+    minutes and angles from the epoch, so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100
+    days from the epoch. A polynomial of slow time would follow these steps, and so curve the path. Instead,
+    Lagrange's polynomial goes through eight positions 30 s apart. Its error in a low orbit is 1e-8 m, from its
+    remainder term. It also smooths the jumps of a few millimetres that SGP4 makes every half day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)
@@ -179,13 +179,13 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 def orbit_of(
     entries: Sequence[Entry], name: str, object_name: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
-    """Orbit of an object from the elements whose epoch is nearest to `center`.
+    """Orbit of an object from the element set whose epoch is nearest to `center`.
 
-    If several epochs are equally near, the last elements are used. `entries` are the entries of a file. The other
-    arguments are those of `OrbitFormat.read`. `object_name` is a name or a catalogue number. Broken entries of
-    other objects are left out, and counted in `Orbit.words`. Raises `PathFileError` in these cases: there
-    are no elements; there are elements of several objects and no name; an entry of the object is broken; an entry is
-    broken and no object is named; SGP4 is missing or refuses the elements.
+    If the epochs of several element sets are equally near, the last of these sets is used. `entries` are the entries
+    of a file. The other arguments are the same as for `OrbitFormat.read`. `object_name` is a name or a catalogue
+    number. Broken entries of other objects are left out, and counted in `Orbit.words`. Raises `PathFileError` in
+    these cases: there are no element sets; there are element sets of several objects and `object_name` is None; an
+    entry of the object is broken; an entry is broken and no object is named; SGP4 is missing or refuses the elements.
     """
     sets = [entry for entry in entries if isinstance(entry, Elements)]
     broken = [entry for entry in entries if isinstance(entry, BrokenEntry)]
@@ -252,14 +252,20 @@ def _hold_to_type(kind: str, location: str) -> None:
 
 
 def _angle(degrees: float, max_degrees: float, quantity: str, location: str) -> float:
-    """Convert an angle from degrees to radians; raises `PathFileError` if it is not from 0 to `max_degrees`. [rad]"""
+    """Convert an angle from degrees to radians.
+
+    Raises `PathFileError` if the angle is not from 0 to `max_degrees`.
+    """
     if not 0 <= degrees <= max_degrees:
         raise PathFileError(f"{location}: {quantity} must be from 0 to {max_degrees:g} degrees (got {degrees:g})")
     return math.radians(degrees)
 
 
 def _mean_motion(turns: float, location: str) -> float:
-    """Convert a mean motion from revolutions per day to rad/min; raises `PathFileError` outside 0 to 20 per day."""
+    """Convert a mean motion from revolutions per day to rad/min.
+
+    Raises `PathFileError` if the mean motion is not between 0 and 20 revolutions per day.
+    """
     if not 0 < turns < 20:
         raise PathFileError(f"{location}: mean motion must be more than 0 and less than 20 a day (got {turns:g})")
     return turns * 2 * math.pi / 1440
@@ -275,8 +281,8 @@ def read_tle(
 ) -> Orbit:
     """Read two-line element sets, and return the orbit of an object.
 
-    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
-    A line with the name may come before each set. Blank lines, and lines that begin with `#`, are ignored.
+    The arguments and errors are the same for all readers; see `OrbitFormat.read`. A line with the name of the object
+    may precede each set. Blank lines, and lines that begin with `#`, are ignored.
     """
     hold_to_size(len(data), name)
     return orbit_of(list(_entries(decoded(data, name), name)), name, object_name, center, orientation)
@@ -291,9 +297,9 @@ def element_sets(text: str, name: str) -> Iterator[Elements]:
 
 
 def _entries(text: str, name: str) -> Iterator[Entry]:
-    """Yield the element sets of a file in order, and a `BrokenEntry` for each broken set.
+    """Yield the element sets of a file in order, and a `BrokenEntry` in place of each broken set.
 
-    After a broken set, reading continues with the next line 1 or name.
+    After a broken set, reading continues at the next name or first line of a set.
     """
     name_line: tuple[int, str] | None = None
     line_1: tuple[int, str] | None = None
@@ -369,7 +375,7 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
     _hold_to_type(line_1[62].strip(), where_1)
 
     def angle(start: int, end: int, max_degrees: float, quantity: str) -> float:
-        """Angle [rad] in the columns `start` to `end` of line 2, counted from 1."""
+        """Read an angle in degrees from the columns `start` to `end` of line 2, counted from 1; returns radians."""
         return _angle(_column(line_2, where_2, start, end, quantity, _DECIMAL), max_degrees, quantity, where_2)
 
     return Elements(
@@ -437,10 +443,10 @@ _VERSION_KEYWORD = "CCSDS_OMM_VERS"
 
 @dataclass(frozen=True, kw_only=True)
 class _Message:
-    """An orbit mean-elements message as read: its keywords and values.
+    """An orbit mean-elements message as read from a file: its keywords and values.
 
-    `problem` describes a fault in the format of the message; empty if there is no fault. `is_complete` is set if
-    every keyword that the standard prescribes must be present, including keywords with a constant value.
+    `problem` describes a fault in the format; it is empty if there is no fault. `is_complete` is set if every keyword
+    that the standard prescribes must be present, including keywords with a constant value.
     """
 
     where: str
@@ -462,7 +468,7 @@ def read_omm(
 ) -> Orbit:
     """Read orbit mean-elements messages, and return the orbit of an object.
 
-    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
+    The arguments and errors are the same for all readers; see `OrbitFormat.read`.
     """
     hold_to_size(len(data), name)
     if is_markup(data):
@@ -478,7 +484,7 @@ def read_omm(
 
 
 def _entry(message: _Message, orientation: Orientation) -> Entry:
-    """Convert a message to mean elements, or to a `BrokenEntry` if the message cannot be used."""
+    """Convert an orbit mean-elements message to `Elements`, or to a `BrokenEntry` if the message cannot be used."""
     try:
         if message.problem:
             raise PathFileError(message.problem)
@@ -504,9 +510,9 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
-    """Split text with a keyword and a value in each line into messages.
+    """Split a text into messages; each line of the text has a keyword and a value.
 
-    Each message begins with the keyword for its version.
+    Each message begins with the keyword `CCSDS_OMM_VERS`.
     """
     leaves: dict[str, str] = {}
     first_line, problem = 0, ""
@@ -574,7 +580,7 @@ _COVARIANCE_KEYWORD = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
 def _covariance(
     record: Mapping[str, object], epoch: Instant, orientation: Orientation, location: str
 ) -> EpochCovariance | None:
-    """Covariance that a message states for the epoch of its elements; None if it states no covariance."""
+    """Covariance that a message states at the epoch of its elements; None if it states no covariance."""
     elements = {key: str(value).strip() for key, value in record.items() if _COVARIANCE_KEYWORD.fullmatch(key)}
     if not any(elements.values()):
         return None

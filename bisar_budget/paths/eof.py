@@ -1,8 +1,8 @@
 """Orbit files of the Sentinels (EOF, Earth Explorer File): XML with a state vector every ten seconds.
 
 Source: Sentinels POD service file format specification (GMES-GSEG-EOPG-FS-10-0075), and ESA's Earth Observation
-mission file format standard (PE-TN-ESA-GS-0001). State vectors are in the axes of ITRF, and their velocities are
-relative to the rotating Earth.
+mission file format standard (PE-TN-ESA-GS-0001). State vectors are in ITRF axes, and their velocities are relative to
+the rotating Earth.
 """
 
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ def read_eof(
 ) -> Orbit:
     """Read an orbit file of a Sentinel, and return the orbit.
 
-    Arguments and errors are the same for all readers, see `OrbitFormat.read`. State vectors are interpolated
+    The arguments and errors are the same for all readers; see `OrbitFormat.read`. State vectors are interpolated
     with Hermite's polynomial of degree 7. `object_name` is a name such as `Sentinel-1A` or `S1A`. `orientation` is
     ignored, because the axes are fixed to the Earth.
     """
@@ -99,7 +99,10 @@ def read_eof(
 
 
 def _dropped(repeated: int) -> str:
-    """Note on the number of repeated state vectors, which occur in joined files; empty if there are none."""
+    """Phrase with the number of repeated state vectors that were left out; empty if no state vector was repeated.
+
+    Files that were joined have repeated state vectors.
+    """
     return f", {repeated} repeated state vector{'s' * (repeated > 1)} left out" if repeated else ""
 
 
@@ -114,9 +117,9 @@ def _text(file: MessageElement, key: str) -> str | None:
 
 
 def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str], int]:
-    """Read the state vectors of a file, without repetitions.
+    """Read the state vectors of a file; repeated state vectors are left out.
 
-    Returns the state vectors, their line numbers, all stated qualities except nominal, and the number of repeated
+    Returns the state vectors, their line numbers, all stated qualities other than nominal, and the number of repeated
     state vectors.
     """
     samples: list[Sample] = []
@@ -157,7 +160,7 @@ def _numbers(vector: MessageElement, elements: dict[str, MessageElement], name: 
 
 
 def _time(vector: MessageElement, elements: dict[str, MessageElement], system: str, name: str) -> Instant:
-    """Time of a state vector, converted from the time system of the file to TAI."""
+    """Time of a state vector in TAI; `system` is the time system of the file."""
     if system not in elements:
         raise PathFileError(f"{name}:{vector.line}: the state vector has no {system}")
     text = elements[system].text.strip()

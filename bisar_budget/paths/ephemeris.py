@@ -1,7 +1,7 @@
 """Ephemerides: positions of an object at given times, often with velocities, and the orbit through these samples.
 
 A position is interpolated in the axes and the time system of the file, and then converted to Earth-fixed axes. The
-`ITRF` of different years differ by centimetres; these differences are ignored.
+realisations of `ITRF` from different years differ by centimetres; these differences are ignored.
 """
 
 import math
@@ -43,7 +43,7 @@ class Interpolation:
 
     @property
     def nodes(self) -> int:
-        """Number of samples that the polynomial interpolates."""
+        """Number of samples through which the polynomial goes."""
         return (self.degree + 1) // 2 if self.is_hermite else self.degree + 1
 
     @property
@@ -54,7 +54,7 @@ class Interpolation:
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples of an object that can be interpolated by a polynomial, because no manoeuvre lies between them.
+    """Samples of an object that can be interpolated by a polynomial, because there is no manoeuvre between them.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Segment:
     turn : callable, optional
         Function that converts positions to Earth-fixed axes; None if `axes` are fixed to the Earth.
     accuracy : callable
-        Function from a time in TAI to the accuracy that the file states, or None.
+        Function that takes a time in TAI, and returns the accuracy that the file states, or None.
     covariances : sequence of EpochCovariance
         Covariances that the file states at epochs.
     remarks : tuple of str
@@ -99,7 +99,7 @@ class Segment:
     remarks: tuple[str, ...] = ()
 
     def is_useable(self, time: Instant) -> bool:
-        """Whether a time in TAI lies between the first and the last useable time."""
+        """Whether a time in TAI lies between the first and the last usable time."""
         return time.since(self.first) >= -_EDGE_S and time.since(self.last) <= _EDGE_S
 
 
@@ -112,9 +112,9 @@ def orbit_through(
     instants. The error of the interpolation is estimated as its distance from a polynomial whose degree is higher by
     two. An error of 1 m or more causes a warning in `Orbit.doubts`.
 
-    `segments` are the segments of a file. The other arguments are those of `OrbitFormat.read`. Raises `PathFileError`
-    if several objects are possible, if the file has no position at `center`, or if its samples there are too far
-    apart. `Orbit.place` raises it outside the span of the segment.
+    `segments` are the segments of a file. The other arguments are the same as for `OrbitFormat.read`. Raises
+    `PathFileError` if several objects are possible, if the file has no position at `center`, or if the samples around
+    `center` are too far apart. `Orbit.place` raises it outside the span of the segment.
     """
     if not segments:
         raise PathFileError(f"{name}: has no ephemeris")
@@ -124,7 +124,7 @@ def orbit_through(
 
 
 class _Between:
-    """Interpolation of a segment, from which `orbit` makes an `Orbit`."""
+    """Interpolation of a segment; the method `orbit` returns it as an `Orbit`."""
 
     def __init__(
         self, segment: Segment, interpolation: Interpolation, orientation: Orientation, center: Instant
@@ -218,12 +218,12 @@ class _Between:
 
 
 def every(samples: Sequence[Sample]) -> str:
-    """Text for reports about the median time between the samples of an ephemeris."""
+    """Phrase for reports that states the median time between the samples of an ephemeris."""
     return f"one state every {minutes(usual_step(samples))}"
 
 
 def minutes(duration_s: float) -> str:
-    """Write a duration [s] as text: in seconds if it is below one minute, and otherwise in minutes."""
+    """Write a duration [s] as text: in seconds if it is below one minute, otherwise in minutes."""
     return f"{duration_s / 60:.3g} min" if duration_s >= 60 else f"{duration_s:.3g} s"
 
 
@@ -246,11 +246,12 @@ def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, In
 
 
 def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Interpolation) -> float:
-    """Estimated error of an interpolation near a time: its distance from a polynomial of a degree higher by two. [m]
+    """Estimated error of an interpolation near a time. [m]
 
-    The result is the larger of the distances at the time itself and midway between the samples around it. If there
-    are too few samples for the higher degree, a degree lower by two is used instead. If this is not possible either,
-    the result is infinite.
+    The interpolation is compared with the polynomial whose degree is higher by two. The result is the larger of their
+    distances at the time itself and midway between the samples around it. If there are too few samples for this
+    polynomial, the interpolation is compared with the polynomial whose degree is lower by two. If there are too few
+    samples for that as well, the result is infinite.
     """
     step = 1 if interpolation.is_hermite else 2
     nodes, is_hermite = interpolation.nodes, interpolation.is_hermite
@@ -268,7 +269,7 @@ def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Inter
 
 
 def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
-    """Choose the degree of the Lagrange interpolation whose estimated error around an instant is smallest."""
+    """Return the Lagrange interpolation of the degree that has the smallest estimated error near `center`."""
     candidates = [Interpolation(False, degree) for degree in _TRIED_DEGREES if degree + 3 <= len(samples)]
     if not candidates:
         return Interpolation(False, min(DEFAULT_DEGREE, len(samples) - 1))
@@ -277,9 +278,9 @@ def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
 
 
 def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segment:
-    """Segment that contains an instant.
+    """Segment that contains the instant `center`.
 
-    If there are several, the result is the segment whose nearer end is farthest from the instant.
+    If several segments contain it, the segment whose nearer end is farthest from the instant is used.
     """
     time = tai(center)
     useable = [segment for segment in segments if segment.is_useable(time)]
@@ -293,11 +294,11 @@ def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segm
 
 
 def velocity_error(samples: Sequence[Sample]) -> float:
-    """Largest relative difference between the velocities of samples and the rates of change of the positions.
+    """Largest relative difference between the stated velocities and the rates of change of the positions.
 
-    About sixteen pairs of neighbouring samples are compared. One pair is not enough: near a pole, where the Earth's
-    rotation hardly moves a position, velocities relative to the wrong axes are almost correct. The result is 0 for
-    too few samples, and NaN if a difference is not finite.
+    About sixteen pairs of neighbouring samples are compared. A single pair is not enough: near a pole, where the
+    Earth's rotation hardly moves a position, velocities relative to the wrong axes are almost correct. The result is
+    0 if there are too few samples, and NaN if a difference is not finite.
     """
     last = len(samples) - _NEIGHBOUR_SAMPLES
     if last < _NEIGHBOUR_SAMPLES:
@@ -308,11 +309,11 @@ def velocity_error(samples: Sequence[Sample]) -> float:
 
 
 def _velocity_error_at(samples: Sequence[Sample], middle: int) -> float:
-    """Relative difference between the stated velocities and the change of the positions, between two samples.
+    """Relative difference of the stated velocities from the rate of change of position between two samples.
 
-    These are the sample `middle` and the sample before it. The stated velocities are interpolated, and averaged over
-    the interval by Gauss-Legendre quadrature. Their mean is compared with the change of position divided by the time.
-    Derived here.
+    The two samples are the sample with the index `middle` and the sample before it. The stated velocities are
+    interpolated, and averaged over the interval by Gauss-Legendre quadrature. Their mean is compared with the change
+    of position divided by the time between the samples. This comparison was derived for this program.
     """
     neighbours = samples[middle - _NEIGHBOUR_SAMPLES : middle + _NEIGHBOUR_SAMPLES]
     velocities = [Sample(sample.time, sample.velocity, sample.velocity) for sample in neighbours]

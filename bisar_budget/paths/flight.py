@@ -2,8 +2,8 @@
 
 All commands take a path as one polynomial over the aperture, or as several polynomials, each over a piece of the
 aperture. An orbit gives a position at any time, and its polynomial interpolates such positions. A log gives measured
-fixes. A polynomial or a spline smooths them by least squares; a spline has as many pieces as the log needs. Every
-path, from an orbit or a log, comes with its distance from the positions in the file.
+fixes. A polynomial or a spline smooths the fixes by least squares; a spline has as many pieces as the log needs. For
+every path, from an orbit or a log, the distance from the positions in the file is also returned.
 """
 
 import math
@@ -38,6 +38,8 @@ _LISTED_TRACK_COUNT = 3  # in an error
 class SmoothingSettings:
     """Parameters of the path that is fitted to the fixes of a log.
 
+    A stretch is a time span around mid-aperture whose fixes are fitted.
+
     Attributes
     ----------
     min_fixes : int
@@ -46,7 +48,7 @@ class SmoothingSettings:
         Number of fixes that is sufficient to separate noise from motion. The shortest stretch contains the aperture
         and at least this number of fixes.
     max_order : int
-        Largest order of a polynomial that is the whole path.
+        Largest order of the polynomial if the whole path is a single polynomial.
     max_pieces : int
         Largest number of pieces of a spline.
     tried_coefficients, tried_ratio : int
@@ -54,34 +56,37 @@ class SmoothingSettings:
         path, up to a number of coefficients: `tried_coefficients`, which is sufficient for 40 full circles, or
         `tried_ratio` times the number of coefficients of the best path so far, whichever is larger.
     clean_rms_m : float
-        Root mean square of residuals below which a path gets no further pieces. [m]
+        A path gets no further pieces if the root mean square of its residuals is below this value. [m]
     white_sigmas : float
         The residuals count as white noise if the mean product of neighbouring residuals is at most this number of
         standard deviations of this mean.
     min_samples : int
         Smallest number of times over the aperture at which the error of a path is sampled.
     samples_per_piece : int
-        Smallest number of such times in a piece.
+        Smallest number of times in each piece at which the error of a path is sampled.
     mode_fraction : float
-        Modes of a `PathNoise` smaller than this fraction of the largest mode are discarded as rounding errors.
+        Modes of a `PathNoise` that are smaller than this fraction of the largest mode are discarded as rounding
+        errors.
     stretch_ratio, widest_ratio : float
         Stretches of increasing duration are fitted. `stretch_ratio` is the ratio of the durations of successive
         stretches, and `widest_ratio` is the ratio of the longest to the shortest duration.
     max_fitted_fixes : int
         Largest number of fixes in a stretch.
     negligible_noise_m : float
-        Error of the path due to noise below which no longer stretch is tried. This error is negligible at any carrier
-        frequency. [m]
+        If the error of the path due to noise is below this value [m], longer stretches are not tried. Such an error
+        is negligible at any carrier frequency.
     chance_factor : float
-        The squared difference of two fits counts as noise up to this factor times its expected variance.
+        The squared difference of two fits counts as noise up to this factor times the square that noise alone is
+        expected to cause.
     hopeless_ratio : float
-        No longer stretch is tried if the squared predicted error exceeds its smallest value so far by this ratio.
+        Longer stretches are not tried if the squared predicted error is more than this ratio times its smallest value
+        so far.
     residual_ratio : float
         The fit of a longer stretch is rejected if the residual in the aperture grows by more than this ratio, because
         the fit then does not follow the path.
     stray_ratio, min_stray_m : float
         A warning names a fix whose residual is larger than `stray_ratio` times the median residual plus
-        `min_stray_m` [m]. Noise of thousands of fixes reaches a ratio of 4.
+        `min_stray_m` [m]. The noise of thousands of fixes reaches a ratio of 4.
     """
 
     min_fixes: int = 5
@@ -113,13 +118,13 @@ NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
 
 
 class PathFileError(Exception):
-    """Raised for a file from which no path can be read.
+    """No path can be read from a file.
 
     The message names the file, and its line, byte or record.
 
     `accepted` describes an accepted file, and `hint` a remedy. `key` is the key of the mission file that contradicts
-    the file; it is empty if the file itself is wrong. `spans` are the times that the file covers, if it does not
-    cover the requested time.
+    the file; it is empty if the file itself is wrong. If the file does not cover the requested time, `spans` are the
+    times that it covers.
     """
 
     def __init__(
@@ -135,7 +140,7 @@ class PathFileError(Exception):
 
 
 def hold_to_bytes(data: bytes, max_bytes: int, name: str) -> None:
-    """Refuse a log of more than `max_bytes` bytes; raises `PathFileError`."""
+    """Raise `PathFileError` if a log has more than `max_bytes` bytes."""
     if len(data) > max_bytes:
         raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} MB are read")
 
@@ -160,7 +165,7 @@ class Orbit:
     Attributes
     ----------
     place : callable
-        Earth-fixed coordinates at an instant. [m]
+        Function that returns the Earth-fixed coordinates at an instant. [m]
     words : str
         Description of the orbit for reports.
     span : tuple of Instant, optional
@@ -168,18 +173,18 @@ class Orbit:
     epoch : Instant, optional
         Epoch of the mean elements; None for an ephemeris.
     doubts : callable
-        Function from an instant to warnings about an unusually large uncertainty.
+        Function that returns warnings about an unusually large uncertainty at an instant.
     doubt : callable
-        Function from an instant to the uncertainty of the orbit as a `PathDoubt`, with its size in m.
+        Function that returns the uncertainty of the orbit at an instant as a `PathDoubt`, whose size is in m.
     remedy : str
         Advice on how to reduce the uncertainty.
     is_turned : bool
         Whether the file states the orbit in axes that are not fixed to the Earth.
     turning_doubt, turning_doubts : callable
-        The parts of `doubt` and `doubts` that are due to the Earth's orientation.
+        The parts of `doubt` and `doubts` that are due to the uncertain orientation of the Earth.
     stated : callable
-        Function from an instant to the accuracy that the file states, along Earth-fixed axes. Its result is None if
-        the file states none.
+        Function that returns the accuracy that the file states for an instant, along Earth-fixed axes; None if it
+        states no accuracy.
     """
 
     place: Callable[[Instant], Vector]
@@ -197,8 +202,8 @@ class Orbit:
     def as_planned(self) -> "Orbit":
         """Return the orbit as a plan that the satellite follows exactly.
 
-        Its uncertainty is due to the Earth's orientation only. The age of the elements and the error of the
-        interpolation are disregarded.
+        The only uncertainty that remains is due to the orientation of the Earth. The age of the elements and the
+        error of the interpolation are disregarded.
         """
         words = f"{self.words}, flown as planned: its age and its interpolation do not count"
         return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
@@ -206,7 +211,7 @@ class Orbit:
     def largest_doubt_m(self, instant: Instant) -> float:
         """Largest distance of the true path from the orbit at an instant. [m]
 
-        It is the uncertainty `doubt`, or the stated accuracy if that is larger.
+        It is the uncertainty `doubt`, or the stated accuracy if it is larger.
         """
         stated = self.stated(instant)
         return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
@@ -216,7 +221,7 @@ class Orbit:
 class LeftOut:
     """The m unusable records of a log.
 
-    `before` (m,) is the number of usable records before each unusable record. `faults` are messages about the
+    `before` (m,) is the number of usable records that precede each unusable record. `faults` are messages about the
     unusable records.
     """
 
@@ -241,21 +246,22 @@ class Log:
     start : Instant, optional
         Origin of `times`, in UTC.
     sigmas : (n, 3), optional
-        One-sigma errors east, north, up that the log states; NaN at a fix without them. [m]
+        1-sigma errors east, north, up that the log states; NaN for a fix without stated errors. [m]
     typical_sigmas : (n,), optional
-        Typical one-sigma error of a fix of the stated quality, on each axis; NaN at a fix without a quality. [m]
+        1-sigma error along each axis that is typical of a fix with the stated quality [m]; NaN for a fix without a
+        stated quality.
     quality_words : callable
-        Function that returns a description of the quality of the fix with a given index, such as "GGA quality 1,
+        Function that takes the index of a fix, and returns a description of its quality, such as "GGA quality 1,
         autonomous".
     clock : str
         "day" if times are counted from midnight UTC, "week" if they are counted from the start of a GPS week.
     left_out : LeftOut, optional
         Records that cannot be used and are not among the fixes.
     tracks : tuple of Log
-        Logs of all tracks of a file with several tracks, if the mission file does not choose one. The log itself is
-        then that of the first track.
+        Logs of all tracks, if the file has several tracks and the mission file does not choose one. The fixes are
+        then those of the first track.
     grid : (3, 3)
-        Displacement vectors due to one rounding step of each coordinate in the log, in the axes of the positions. [m]
+        Displacement vectors due to one rounding step of each coordinate in the log, in the axes of the positions [m].
         A zero vector means that no rounding was found.
     """
 
@@ -275,7 +281,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A path that consists of polynomials, and its distance from the positions of its file.
+    """A path that consists of polynomials, and its distance from the positions in its file.
 
     Attributes
     ----------
@@ -284,26 +290,26 @@ class Fitted:
     order : int
         Order of the polynomials.
     farthest, rms : float
-        Largest and root-mean-square distance of the path from the positions of the file. [m]
+        Largest and root-mean-square distance of the path from the positions in the file. [m]
     samples : int
-        Number of fixes of a log that the path smooths; 0 for an orbit, which is interpolated.
+        Number of fixes of a log to which the path is fitted; 0 for an orbit, which is interpolated.
     doubts : tuple of str
         Warnings about the path.
     stretch : float
-        Length of the time span around mid-aperture whose fixes the path smooths. [s]
+        Length of the time span around mid-aperture whose fixes are fitted. [s]
     missed : float
-        Root mean square distance of a fix of the log from a path that is fitted without this fix. [m]
+        Root-mean-square distance of a fix of the log from a path that is fitted without this fix. [m]
     residual : (3, 3)
         Covariance of the residuals of the fixes in the aperture. [m²]
     correlation_time : float
-        Correlation time of a Gauss-Markov process that is correlated like the residuals. [s]
+        Correlation time of the Gauss-Markov process that has the same correlation as the residuals. [s]
     acceleration_noise : (3, 3)
-        Covariance of the error of the acceleration. [m²/s⁴] The error is caused by noise of the fixes, and by motion
-        that is smeared if fixes beyond the shortest time span are smoothed. For a single polynomial, it is the error
-        at mid-aperture. For several pieces, it is the acceleration of the parabola that is fitted to the position
-        error over the aperture.
+        Covariance of the error of the acceleration [m²/s⁴]. The error is caused by noise of the fixes, and by motion
+        that is smeared if fixes beyond the shortest time span are fitted. For a single polynomial, it is the error at
+        mid-aperture. For several pieces, it is the acceleration of the parabola that is fitted to the position error
+        over the aperture.
     path_noise : PathNoise, optional
-        Error of the path over the aperture due to the same causes.
+        Error of the path over the aperture due to the causes described under `acceleration_noise`.
     pieces : int
         Number of polynomials. Neighbouring polynomials meet with equal position and velocity.
     """
@@ -331,7 +337,7 @@ def interpolated(
     Parameters
     ----------
     positions_at : callable
-        Function from slow times (n,) [s] to positions (n, 3) in the axes of the scene [m].
+        Function that takes slow times (n,) [s], and returns positions (n, 3) in the axes of the scene [m].
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
@@ -355,8 +361,8 @@ def interpolated(
 def stretch_around(times: Floats, aperture_time_s: float) -> float:
     """Length of the shortest time span around mid-aperture whose fixes can be smoothed. [s]
 
-    The span is the aperture. If the aperture has fewer than nine fixes, the span is just long enough for nine: a log
-    at 1 Hz has only three fixes in 3 s.
+    This is the length of the aperture. If the aperture has fewer than nine fixes, the time span is extended until it
+    contains nine, because a log at 1 Hz, for example, has only three fixes in 3 s.
     """
     distances = np.sort(np.abs(times))[: _SMOOTHING.noise_fixes]
     return max(aperture_time_s, 2 * float(distances.max(initial=0.0)))
@@ -365,6 +371,8 @@ def stretch_around(times: Floats, aperture_time_s: float) -> float:
 @dataclass(frozen=True, eq=False)
 class _SmoothFit:
     """Least-squares path through the fixes of a stretch: a Legendre series or a spline.
+
+    A stretch is a time span around mid-aperture.
 
     Attributes
     ----------
@@ -379,7 +387,7 @@ class _SmoothFit:
     independent : float
         Number of independent fixes that would contain the same information as the correlated fixes.
     root : (coefficients, coefficients)
-        Matrix whose product with its transpose is the covariance of the coefficients for white fixes of variance 1.
+        Matrix whose product with its transpose is the covariance of the coefficients for white noise of variance 1.
     spline : SplineFit, optional
         The spline; None for a Legendre series.
     """
@@ -406,7 +414,7 @@ class _SmoothFit:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the coefficients for fixes of variance 1.
+        """Covariance of the coefficients if the noise of the fixes has the variance 1.
 
         Correlated fixes count as fewer fixes, which enlarges the covariance.
         """
@@ -414,7 +422,7 @@ class _SmoothFit:
 
     @property
     def variances(self) -> Floats:
-        """Variance of the noise of a fix along each axis, (3,), estimated from the residuals. [m²]"""
+        """Noise variance of a fix along each axis (3,), estimated from the residuals. [m²]"""
         variances: Floats = (self.residuals**2).sum(axis=0) / max(len(self.residuals) - len(self.series), 1)
         return variances
 
@@ -422,8 +430,8 @@ class _SmoothFit:
     def common_motion(self) -> tuple[float, float]:
         """Mean scalar product of successive residuals, and the standard deviation of this mean. [m²]
 
-        For fixes with white noise the expected mean is zero. The mean is corrected for the effect of the fit, which
-        would make it negative.
+        The mean shows whether the residuals still contain motion: its expectation is zero if the noise of the fixes
+        is white. The fit itself biases the mean towards negative values; the result is corrected for this bias.
         """
         products = (self.residuals[1:] * self.residuals[:-1]).sum(axis=1)
         mean, square = float(products.mean()), float(np.mean(np.sum(self.residuals**2, axis=1)))
@@ -436,18 +444,18 @@ class _SmoothFit:
         return math.sqrt(float(np.mean(np.sum(self.residuals**2, axis=1))))
 
     def basis(self, times: Floats) -> Floats:
-        """Matrix (m, coefficients) that converts coefficients to positions at slow times (m,) [s]."""
+        """Matrix (m, coefficients) that converts the coefficients of the path to positions at slow times (m,) [s]."""
         if self.spline is not None:
             return spline_basis(times, self.spline.edges)
         return np.asarray(legendre.legvander(times / self.half_s, self.order))
 
     def places(self, times: Floats) -> Floats:
-        """Positions (m, 3) [m] on the path at slow times (m,) [s]."""
+        """Positions (m, 3) on the path [m] at slow times (m,) [s]."""
         positions: Floats = self.basis(times) @ self.series
         return positions if self.spline is None else positions + self.spline.center
 
     def leverage(self, times: Floats) -> Floats:
-        """Variance of the path at slow times (m,) [s], divided by the variance of a fix."""
+        """Ratio of the variance of the path, at slow times (m,) [s], to the variance of a fix."""
         return np.asarray(np.sum((self.basis(times) @ self.root) ** 2, axis=1))
 
     def state(self) -> PlatformState:
@@ -462,8 +470,8 @@ class _SmoothFit:
     def noise(self, times: Floats, left_out: Floats) -> float:
         """Mean square of the path error due to noise of the fixes, over slow times (m,). [m²]
 
-        `left_out` (m, m) is a projection, for example onto straight lines. The projected part of the error is
-        excluded.
+        `left_out` (m, m) is a projection, for example onto straight lines. The part of the error onto which it
+        projects is excluded.
         """
         basis = self.basis(times)
         basis = basis - left_out @ basis
@@ -488,7 +496,7 @@ class _SmoothFit:
     def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
         """Error of the path over the aperture due to noise of the fixes.
 
-        Its variance is multiplied by `excess`, the error ratio of `_widened`.
+        `excess` is a factor on the variance of this error; it is the error ratio that `_widened` returns.
         """
         sample_times, half_s = self.sample_times(aperture_time_s), aperture_time_s / 2
         through = np.linalg.pinv(legendre.legvander(sample_times / half_s, _SMOOTHING.max_order)) @ self.basis(
@@ -513,9 +521,9 @@ class _SmoothFit:
 def _information(residuals: Floats, coefficients: int, independent: float) -> float:
     """Information criterion of a fit with residuals (n, 3) [m]. A smaller value is better.
 
-    Each axis has its own noise variance, and the same number of coefficients. The last factor of the cost is taken
-    from AICc (Hurvich & Tsai 1989). It corrects for overfitting: a path with many coefficients fits a small number of
-    fixes too well by chance. `independent` is the number of independent fixes with the same information.
+    Each axis has its own noise variance, and the same number of coefficients. The criterion is corrected for
+    overfitting as in AICc (Hurvich & Tsai 1989), because a path with many coefficients fits a small number of fixes
+    too well by chance. `independent` is the number of independent fixes with the same information.
     """
     count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
@@ -525,7 +533,7 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
     """Fit the path with the smallest Bayesian information criterion (Schwarz 1978) to the fixes of a stretch.
 
-    The path is a polynomial. If `may_have_pieces` is set, a spline is also tried, and used if its criterion is
+    The path is a polynomial. If `may_have_pieces` is set, a spline is also tried, and is used if its criterion is
     smaller. `half_s` is half the length of the stretch. [s]
     """
     inside = np.abs(times) <= half_s * (1 + 1e-9)
@@ -541,10 +549,11 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
 
 
 def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
-    """Replace a polynomial by a spline fitted to the same fixes (n, 3) [m] if this improves the criterion.
+    """Replace a polynomial by a spline if this improves the information criterion.
 
-    The criterion is computed by `_information`. Pieces are halved, see `splines`, as long as neighbouring residuals
-    are correlated.
+    The spline is fitted to the same fixes, which have the positions `positions` (n, 3) [m]. The criterion is computed
+    by `_information`. As long as neighbouring residuals are correlated, pieces of the spline are halved (see
+    `splines`).
     """
     best = newest = fit
     edges: Floats | None = np.array([-fit.half_s, fit.half_s])
@@ -573,10 +582,10 @@ def _in_pieces(fit: _SmoothFit, positions: Floats) -> _SmoothFit:
 def _widened(
     narrowest: _SmoothFit, times: Floats, positions: Floats, aperture_time_s: float, widest_s: float
 ) -> tuple[_SmoothFit, float]:
-    """Find the length of the stretch whose fit has the smallest predicted error over the aperture.
+    """Find the stretch whose fit has the smallest predicted error over the aperture.
 
-    Returns the fit and its error ratio, which is the squared predicted error divided by the squared error due to
-    noise.
+    A stretch is a time span around mid-aperture. Returns its fit, and the error ratio: the squared predicted error
+    divided by the squared error due to noise.
 
     A longer stretch averages more noise: the acceleration of a parabola through n fixes of noise σ over the time T
     has an error of σ√(720/(n·T⁴)). But a longer stretch may smear the motion of the platform. The smear is unknown,
@@ -636,22 +645,22 @@ def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
 
 
 def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
-    """Path that fits the fixes of a log around the aperture by least squares.
+    """Fit a path to the fixes of a log around the aperture by least squares.
 
-    The path is a polynomial of the order with the smallest Bayesian information criterion (Schwarz 1978), which is at
-    most 8, and at most half the number of fixes. If the residual of a single polynomial still contains motion, the
-    path is a spline, whose number of pieces is chosen by the same criterion, see `splines`. Motion that is too fast
-    for the path counts as noise of the log, or as vibration. Fixes with correlated residuals count as fewer fixes, so
-    that a slow error of the log, which looks like motion, is not fitted.
+    The path is a polynomial of the order with the smallest Bayesian information criterion (Schwarz 1978). The order
+    is at most 8, and at most half the number of fixes. If the residuals of a single polynomial still contain motion,
+    the path is a spline, whose number of pieces is chosen by the same criterion (see `splines`). Motion that is too
+    fast for the path counts as noise of the log, or as vibration. Fixes with correlated residuals count as fewer
+    fixes, so that a slow error of the log, which looks like motion, is not fitted.
 
-    The stretch is the time span whose fixes are smoothed. It is the shortest possible span around the aperture, or a
-    longer span if the predicted error of the path is then smaller, see `_widened`. This matters because noise of the
+    The stretch is the time span whose fixes are used. It is the shortest possible span around the aperture, or a
+    longer span if the predicted error of the path is then smaller (see `_widened`). This matters because noise of the
     log causes an apparent acceleration of the path, which makes allowables wrong.
 
     `Fitted.missed` is computed by leaving out, one at a time, the fixes in the aperture and the fixes directly before
     and after it (Allen 1974). `missed` contains the noise, the motion that the polynomial does not follow, and the
-    motion between two fixes, which a log with a low rate does not show. If the path has more noise than a fix, as in
-    a gap, `missed` is multiplied by this ratio.
+    motion between two fixes, which a log with a low rate does not show. If the path has more noise than a fix, for
+    example in a gap of the log, `missed` is multiplied by the ratio of the two.
 
     Parameters
     ----------
@@ -662,7 +671,7 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
     aperture_time_s : float
         Length of the aperture. [s]
     widest_s : float
-        Length of the longest time span around mid-aperture whose fixes may be smoothed. If omitted, the shortest
+        Length of the longest time span around mid-aperture whose fixes may be used. If omitted, the shortest
         stretch is used. [s]
 
     Raises
@@ -723,10 +732,10 @@ def smoothed(times: Floats, positions: Floats, aperture_time_s: float, widest_s:
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Slice that selects the fixes in the aperture, and one fix before and after it, from slow times (n,) [s].
+    """Slice that selects the fixes in the aperture, the last fix before it, and the first fix after it.
 
-    The accuracy of a log is the largest sigma of these fixes, because the mean sigma would be smaller than the error
-    of the log at some times in the aperture.
+    `times` are the slow times of the fixes (n,) [s]. The accuracy of a log is the largest sigma of the selected
+    fixes, because the mean sigma would be smaller than the error of the log at some times in the aperture.
     """
     half = aperture_time_s / 2
     first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
@@ -736,7 +745,7 @@ def around_aperture(times: Floats, aperture_time_s: float) -> slice:
 def slow_times(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Floats:
-    """Slow time of each fix of a log that covers the aperture.
+    """Slow times of the fixes of a log, which has to cover the aperture.
 
     Parameters
     ----------
@@ -760,7 +769,7 @@ def slow_times(
     ------
     PathFileError
         The log begins or ends more than one median interval inside the aperture, has a gap in the aperture, or does
-        not have the clock on which the middle is given. A gap is longer than five median intervals. The median
+        not use the clock in which the middle is given. A gap is longer than five median intervals. The median
         interval is computed for the fixes in the aperture and for the whole log, and the smaller value is used.
     """
     times, start = log.times, log.start
@@ -780,7 +789,7 @@ def slow_times(
     slow, half = times - middle, aperture_time_s / 2
 
     def cause(index: int) -> str:
-        """Message about an unusable record directly before the fix with a given index, or an empty string."""
+        """Message about an unusable record directly before the fix with the index `index`, or an empty string."""
         if log.left_out is None or index not in log.left_out.before:
             return ""
         return f"; {log.left_out.faults[int((log.left_out.before == index).argmax())]}"
@@ -834,8 +843,8 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 def dated(log: Log, center: Instant | None) -> Log:
     """Add a date to a log that has only times of day.
 
-    The date is chosen so that the log is as close as possible to the middle of the aperture, `center`. Logs of all
-    other kinds are returned unchanged, as is every log if `center` is None.
+    The date is chosen so that the log is as close as possible to `center`, the middle of the aperture. If `center` is
+    None, or if the log has dates or is of another kind, it is returned unchanged.
     """
     if log.clock != "day" or log.start is not None or center is None:
         return log
@@ -848,14 +857,14 @@ def dated(log: Log, center: Instant | None) -> Log:
 def track_around(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Log:
-    """Track that covers the aperture in a log of several tracks; any other log is returned unchanged.
+    """Track that covers the aperture, from a log of several tracks; any other log is returned unchanged.
 
     The parameters are the same as in `slow_times`.
 
     Raises
     ------
     PathFileError
-        No track covers the aperture, or several tracks do.
+        No track covers the aperture, or several tracks cover it.
     """
     if not log.tracks:
         return log
@@ -884,22 +893,22 @@ def track_around(
 
 
 def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
-    """Refuse a log with an unusable record within the stretch that is fitted.
+    """Refuse a log with an unusable record in the time span whose fixes are used.
 
     Parameters
     ----------
     log : Log
-        The log. An unusable record has no time. It counts as inside the stretch if the interval between the usable
-        fixes before and after it overlaps the stretch.
+        The log. An unusable record has no time. It counts as inside the time span if the interval between the usable
+        fixes before and after it overlaps the time span.
     times : (n,) ndarray
         Slow times of the log. [s]
     stretch_s : float
-        Time around the middle of the aperture whose fixes are used. [s]
+        Length of the time span around the middle of the aperture. [s]
 
     Raises
     ------
     PathFileError
-        The stretch has an unusable record. The message names the first one.
+        There is an unusable record in the time span. The message names the first one.
     """
     if log.left_out is None:
         return
@@ -915,10 +924,11 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
 
 
 def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
-    """Longest time span around the middle of an aperture within which a log is complete. [s]
+    """Length of the longest time span around the middle of the aperture in which a log is complete. [s]
 
-    The span ends before the nearest unusable record or gap of more than five median intervals. A log with such a
-    record or gap outside the shortest stretch can still be used, except for the fixes beyond the record or gap.
+    The span ends before the nearest unusable record or gap. A gap is longer than five times the median interval
+    between fixes. If the nearest record or gap is outside the shortest time span that can be smoothed, the log is
+    usable, except for the fixes beyond the record or gap.
 
     Parameters
     ----------
@@ -946,10 +956,10 @@ def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
 
 
 def _independent(residuals: Floats) -> float:
-    """Number of independent samples that contain as much information as the correlated residuals (n, 3).
+    """Number of independent samples that contain as much information as n correlated residuals (n, 3).
 
     The number is n for white noise. Otherwise, n is divided by the sum of the autocorrelation up to its first zero.
-    The autocorrelation is the mean over the three axes.
+    The autocorrelation is averaged over the three axes.
     """
     count = len(residuals)
     spectrum = np.abs(np.fft.rfft(residuals, 2 * count, axis=0)) ** 2
@@ -961,7 +971,7 @@ def _independent(residuals: Floats) -> float:
 
 # ---------------------------------------------------------------------- polynomials of slow time
 def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tuple[Floats, Floats]:
-    """Least-squares fit of a Legendre series of the given order to positions.
+    """Fit a Legendre series of the given order to positions by least squares.
 
     Parameters
     ----------
@@ -969,6 +979,8 @@ def least_squares(normalised_times: Floats, positions: Floats, order: int) -> tu
         Times of the positions, scaled to -1 … 1.
     positions : (n, 3) ndarray
         Positions to fit. [m]
+    order : int
+        Order of the series.
 
     Returns
     -------
@@ -985,8 +997,8 @@ def powers_of(
 ) -> Floats:
     """Convert the coefficients of a series over -`half_s` … `half_s` to coefficients of τ⁰, τ¹, … [m, m/s, …]
 
-    Coefficients and result are (order + 1, 3). `convert` converts the coefficients of a series over -1 … 1 on one
-    axis; the default is for a Legendre series.
+    Both the argument and the result have the shape (order + 1, 3). `convert` converts the coefficients of a series
+    over -1 … 1 to coefficients of powers, for one component at a time; by default, the series is a Legendre series.
     """
     powers = np.zeros_like(coefficients)
     for axis in range(3):
@@ -1001,9 +1013,9 @@ def _vector(values: Floats) -> Vector:
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
-    """Path that is a polynomial of slow time, from its coefficients of τ⁰, τ¹, … (at least two).
+    """Path that is a polynomial of slow time with the given coefficients of τ⁰, τ¹, … (at least two).
 
-    Zero coefficients of the highest powers are left out.
+    If the coefficients of the highest powers are zero, they are left out.
     """
     vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
     position, velocity, (x, y, z), *bends = vectors if len(vectors) > 2 else [*vectors, STRAIGHT]
@@ -1024,8 +1036,8 @@ class Sample(NamedTuple):
 def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
     """Position at a time, interpolated from the `count` samples around it. [m]
 
-    The same `count` samples are used for all times between two neighbouring samples. A sample at the boundary of two
-    intervals is used in both intervals, for even and odd `count`, so that the path has no jumps.
+    For all times between two neighbouring samples, the same `count` samples are used. The path has no jumps at the
+    samples: the polynomials before and after a sample both go through it, whether `count` is even or odd.
     """
     after = bisect_right(samples, time, key=lambda sample: sample.time)
     first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
@@ -1036,7 +1048,8 @@ def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite
 def _through(samples: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
     """Position at time 0 on a polynomial through samples: Lagrange's, or Hermite's if velocities are used too. [m]
 
-    `times` are the times of the samples, relative to the requested time. [s] The result is NaN if it overflows.
+    `times` [s] are the times of the samples relative to the requested time. If the computation overflows, the result
+    is NaN.
 
     Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
     """

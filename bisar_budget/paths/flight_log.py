@@ -4,18 +4,18 @@
     time [s], latitude [deg], longitude [deg], height [m]
     0.00, 48.086600, 11.279700, 3000.0
 
-The time column is `time [s]`, counted from any origin, or it has ISO 8601 time stamps. The stamps of a column `utc`
-end with Z; the stamps of `gpst` and `tai` have no zone. `time [UTC]` means the same as `utc`. A `time` column without
-a unit has time stamps in the time scale that the mission file states.
+The time column is either `time [s]`, counted from any origin, or contains ISO 8601 time stamps. Time stamps in a
+column `utc` end with Z; time stamps in columns `gpst` and `tai` have no zone. `time [UTC]` means the same as `utc`. A
+column `time` without a unit has time stamps in the time scale that the mission file states.
 
-A position is `latitude` and `longitude` with `height` above the WGS-84 ellipsoid or `altitude` above mean sea level.
-It may also be Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` from the scene centre. `geoid_separation` converts
-an altitude into a height.
+A position is stated as `latitude` and `longitude` with `height` above the WGS-84 ellipsoid or `altitude` above mean
+sea level. It may also be stated as Earth-fixed `x`, `y`, `z`, or as `east`, `north`, `up` from the scene centre.
+`geoid_separation` converts an altitude into a height.
 
-`sigma_east`, `sigma_north` and `sigma_up`, or the names that other programs use, are one-sigma errors of the
+`sigma_east`, `sigma_north` and `sigma_up`, or the names that other programs use, are 1-sigma errors of the
 position. A cell in these columns is ignored if it does not contain a positive number. An unknown column that may be
 an accuracy is refused. Other columns are not read. Cells are separated by commas, semicolons or tabs. The headers of
-some exporters are also accepted; they are listed below.
+some exporters are also accepted; they are listed at the end of this module.
 """
 
 import csv
@@ -88,10 +88,11 @@ _CLOCKS_APART_S = 1.0  # accepted drift of an exporter's two clocks, beyond the 
 
 
 class _Column(NamedTuple):
-    """A column that is read: its name, unit as written, factor to SI, and index in a row. A time stamp has no unit.
+    """A column that is read: its name, its unit as written, the factor to SI, and its index in a row.
 
-    Columns of exported logs are renamed like the columns of plain logs. They include further columns: `unix` (time
-    since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), and `receiver` (number of the receiver).
+    A column of time stamps has no unit. Columns of logs from known exporters are renamed to the names of a plain log.
+    Such logs may have further columns: `unix` (time since 1970 in UTC), `week` (GPS week), `fix` (kind of fix), and
+    `receiver` (number of the receiver).
     """
 
     name: str
@@ -104,7 +105,7 @@ class _Vendor(NamedTuple):
     """A program that exports logs: its name in reports, the column names that identify it, and its columns.
 
     `columns` maps the column names of the exporter, in lower case, to the columns of a plain log. `least_fix` is the
-    lowest code of a kind of fix that has a height.
+    lowest code for a kind of fix that includes a height.
     """
 
     words: str
@@ -115,11 +116,11 @@ class _Vendor(NamedTuple):
 
 @dataclass(frozen=True)
 class _Header:
-    """The header of a log: its line, the delimiter and number of cells, and the columns that are read.
+    """The header of a log: its line, the delimiter, the number of cells, and the columns that are read.
 
     `numbers` are the columns of numbers, except for position errors. `accuracy` are the columns of position errors,
     whose cells may be empty. `stamp` is the column of time stamps, which are in the time scale `scale`. `zone`
-    matches the end of a stamp; it decides whether a time zone is required, forbidden or optional.
+    matches the end of a time stamp; it decides whether a time zone is required, forbidden or optional.
     """
 
     line: int
@@ -134,7 +135,7 @@ class _Header:
 
     @property
     def columns(self) -> tuple[_Column, ...]:
-        """All columns of a `_Table` in order: first `numbers`, then `accuracy`."""
+        """All columns of a `_Table` in order: `numbers`, followed by `accuracy`."""
         return (*self.numbers, *self.accuracy)
 
     @property
@@ -143,7 +144,7 @@ class _Header:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the three coordinates, such as latitude, longitude and height."""
+        """Names of the three coordinates of a position, such as latitude, longitude and height."""
         return next((kind for kind in _POSITION_COLUMNS if kind[1] in self.names), _GEODETIC)
 
     def index_of(self, name: str) -> int | None:
@@ -154,8 +155,8 @@ class _Header:
 class _Table(NamedTuple):
     """Rows of a log: their line numbers (n,), numbers (n, columns) in units of the file, and time stamps.
 
-    A time stamp is split into two numbers: `minutes`, the seconds from MJD 0 to the start of its minute, and
-    `seconds` within the minute. [s] `minutes` is NaN if the exporter omits the time stamp.
+    A time stamp is split into two numbers [s]: `minutes`, the time from MJD 0 to the start of its minute, and
+    `seconds`, the time within the minute. `minutes` is NaN if the exporter omits the time stamp.
     """
 
     lines: NDArray[np.int64]
@@ -176,7 +177,7 @@ def is_csv(data: bytes) -> bool:
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
     """Read a flight log in UTF-8 of at most `MAX_CSV_BYTES` bytes.
 
-    Arguments and errors are the same for all readers, see `LogFormat.read`. Geodetic positions are
+    The arguments and errors are the same for all readers; see `LogFormat.read`. Geodetic positions are
     converted to Earth-fixed positions, and time stamps to seconds after the first time stamp.
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
@@ -209,11 +210,11 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
 
 
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
-    """Select the rows that have a position; return them and the number of rows without a position.
+    """Select the rows that have a position; return them, and the number of rows without a position.
 
-    The rows of a plain log are unchanged. From an exported log, rows without a fix are dropped, as are rows of
-    receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers and the
-    mission file does not choose one, or if it chooses one and the log has no column of receivers.
+    The rows of a plain log are unchanged. In a log from a known exporter, rows without a fix are dropped, as are rows
+    of receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers and
+    the mission file does not choose one, or if it chooses one and the log has no column of receivers.
     """
     receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
@@ -250,9 +251,9 @@ def _hold_to_datum(lines: Sequence[str], name: str) -> None:
 
 
 def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
-    """Times of the rows [s], the instant from which they are counted, and a note on its accuracy, which may be empty.
+    """Times of the rows [s], the instant from which they are counted, and a note on the accuracy of this instant.
 
-    The instant is in the time scale of the header. It is None if the log does not state it.
+    The instant is in the time scale of the header; it is None if the log does not state it. The note may be empty.
     """
     time_index = header.index_of("time")
     counted_s = np.zeros(len(table.lines))
@@ -289,13 +290,13 @@ def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats,
 
 
 def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
-    """Convert the times of a fine clock to UTC, with time stamps from a second clock that writes whole seconds.
+    """Convert the times of a fine clock to UTC, using time stamps from a second clock that writes whole seconds.
 
-    `counted_s` are the times of the fine clock, and `instants` the time stamps, truncated to whole seconds. [s] In
-    each row, the stamp minus the fine time is at most the UTC at which the fine clock was zero, and less than 1 s
-    before it. All rows together bound this UTC, and the midpoint of the bounds is used. Returns the times since the
-    first row [s], the instant of the first row, and a note on the accuracy of UTC. Raises `PathFileError` if there is
-    no stamp, or if the clocks drift apart.
+    `counted_s` are the times of the fine clock [s], and `instants` are the time stamps, truncated to whole seconds
+    [s]. The fine clock was zero at an unknown time in UTC. In each row, the stamp minus the fine time is at most this
+    unknown time, and is less than 1 s before it. All rows together bound the unknown time, and the midpoint of the
+    bounds is used. Returns the times since the first row [s], the instant of the first row, and a note on the
+    accuracy of UTC. Raises `PathFileError` if there is no stamp, or if the clocks drift apart.
     """
     has_instant = np.isfinite(instants) & records.is_usable
     if not has_instant.any():
@@ -320,10 +321,10 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
 
 
 def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
-    """Coordinates (3, n) named by the header; latitude and longitude are in rad, all other coordinates in m.
+    """Coordinates (3, n) of the positions; latitude and longitude are in rad, all other coordinates in m.
 
-    An altitude is converted to a height above the ellipsoid. Rows with impossible coordinates are marked as unusable
-    in `records`.
+    The header determines which coordinates these are. An altitude is converted to a height above the ellipsoid. Rows
+    with impossible coordinates are marked as unusable in `records`.
     """
     kind = header.axes
     is_geodetic = kind == _GEODETIC
@@ -371,18 +372,18 @@ def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKey
 
 
 def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
-    """Positions (n, 3) from coordinates (3, n), in Earth-fixed or scene axes. [m]
+    """Convert coordinates (3, n) to positions (n, 3). [m]
 
-    Coordinates `east`, `north`, `up` stay in scene axes; geodetic coordinates are converted.
+    Geodetic coordinates become Earth-fixed positions; `x`, `y`, `z` and `east`, `north`, `up` keep their axes.
     """
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
 def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[str, Floats], str]:
-    """One-sigma errors (n,) [m] by name, such as `sigma_east`, and a note on the number of unusable cells.
+    """1-sigma errors (n,) [m] by name, such as `sigma_east`, and a note on the number of unusable cells.
 
     A row is dropped if an accuracy cell contains neither a number nor a usual code for a missing value. If a log
-    states both a sigma and a variance of the same axis, the larger error is used.
+    states both a sigma and a variance along the same axis, the larger error is used.
     """
     figures: dict[str, Floats] = {}
     negative = 0
@@ -403,10 +404,11 @@ def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[
 
 
 def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up; NaN for an unknown error. [m]
+    """1-sigma errors (n, 3) east, north, up; NaN for an unknown error. [m]
 
-    `figures` are errors (n,) by name, from `_figures`, and `positions` are the coordinates (3, n). If several columns
-    state the error of the same axis, the largest error is used. Returns None if no row states an error.
+    `figures` are the errors (n,) by name that `_figures` returns, and `positions` are the coordinates (3, n). If
+    several columns state an error along the same axis, the largest error is used. Returns None if no row states an
+    error.
     """
     local, fixed = (
         known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
@@ -421,7 +423,7 @@ def _sigmas(figures: Mapping[str, Floats], header: _Header, positions: Floats) -
 
 
 def _level_axes(fixed: Floats, header: _Header, positions: Floats) -> Floats:
-    """Convert independent one-sigma errors along Earth-fixed axes to errors (n, 3) east, north, up. [m]"""
+    """Convert independent 1-sigma errors along Earth-fixed axes to errors (n, 3) east, north, up. [m]"""
     if header.axes == _GEODETIC:
         latitude, longitude = positions[:2]
     else:
@@ -432,7 +434,7 @@ def _level_axes(fixed: Floats, header: _Header, positions: Floats) -> Floats:
 
 
 def _text(data: bytes, name: str) -> str:
-    """Decode a file to text, with a line feed at the end of each line; raises `PathFileError` if it is not UTF-8."""
+    """Decode a file to text whose lines end with line feeds; raises `PathFileError` if it is not UTF-8."""
     hold_to_bytes(data, MAX_CSV_BYTES, name)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PathFileError(f"{name}:1: is in UTF-16; save it in UTF-8")
@@ -462,13 +464,19 @@ def _has_content(line: str) -> bool:
 
 
 def _name_of(cell: str) -> tuple[str, str | None]:
-    """Name of a column in lower case, up to the first bracket, and the unit in square brackets or None."""
+    """Name of a column in lower case, up to the first bracket, and the unit in square brackets.
+
+    The unit is None if there is no unit in square brackets.
+    """
     name, unit = _written_name(cell)
     return name.lower().replace(" ", "_"), unit
 
 
 def _written_name(cell: str) -> tuple[str, str | None]:
-    """Name of a column as the file writes it, up to the first bracket, and the unit in square brackets or None."""
+    """Name of a column as written in the file, up to the first bracket, and the unit in square brackets.
+
+    The unit is None if there is no unit in square brackets.
+    """
     cell = cell.strip()
     match = _COLUMN_HEADER_PATTERN.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"')
@@ -483,9 +491,9 @@ def _accuracy_columns(
 ) -> tuple[_Column, ...]:
     """Find the columns that state position errors, from the cells of a header.
 
-    `kind` are the names of the coordinates. `level_columns` are error columns that are already known, and come first
-    in the result. `refuse` is called to raise an error if a column is unclear or given twice, or if a column that it
-    needs is missing.
+    `kind` are the names of the coordinates. `level_columns` are error columns that are already known; they come first
+    in the result. The function `refuse` is called to raise an error if a column is unclear or given twice, or if the
+    log lacks a column that is needed together with a column that it has.
     """
     columns = dict(level_columns)
     has_covariance = False
@@ -521,11 +529,11 @@ def _accuracy_columns(
 
 
 def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoReturn]) -> dict[str, _Column]:
-    """Rename error columns whose names may mean either the height or a horizontal error.
+    """Rename error columns whose names may refer either to the height or to a horizontal error.
 
     A `sigma_h` is a horizontal error if the log has a vertical accuracy. It is a height error if the log has an east
     error and no other error of the height. Any other `sigma_h` is refused. A `sigma_up` becomes a vertical accuracy
-    if the log has a horizontal accuracy, but no errors of east and north.
+    if the log has a horizontal accuracy, but no errors east and north.
     """
     level, vertical = _LEVEL_ACCURACIES
     if "sigma_h" in columns:
@@ -542,9 +550,9 @@ def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoR
 
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
-    """Read the header of a log from its first line that is neither blank nor a comment.
+    """Read the header of a log from the first line that is neither blank nor a comment.
 
-    Raises `PathFileError` if the header is empty, or if columns are missing, given twice or contradictory.
+    Raises `PathFileError` if there is no such line, or if columns are missing, given twice or contradictory.
     """
     at = next((n for n, line in enumerate(lines) if _has_content(line)), None)
     if at is None:
@@ -621,7 +629,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
 def _vendor_header(
     vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
-    """Make the header of a log written by a known exporter, from the cells of the first line."""
+    """Make the header of a log that was written by a known exporter, from the cells of its first line."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         column = vendor.columns.get(cell.strip().lower())
@@ -662,7 +670,7 @@ def _measured(
     refuse: Callable[[str], NoReturn],
     dimension: units.Dimension | None = None,
 ) -> _Column:
-    """Describe a column of numbers; refuse a unit that is missing, unknown or of the wrong dimension."""
+    """Make a `_Column` of numbers; a unit that is missing, unknown or of the wrong dimension is refused."""
     dimension = dimension or _COLUMN_DIMENSIONS.get(name, units.LENGTH)
     example = (
         "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
@@ -680,8 +688,8 @@ def _measured(
 class _Rows:
     """Rows of a log that have been read so far.
 
-    `broken` are messages about unusable rows, by line. `most_broken` is the largest permitted number of such rows.
-    `empty` is the number of rows in which an exporter left cells for numbers empty.
+    `broken` contains messages about unusable rows, by line. `most_broken` is the largest permitted number of such
+    rows. `empty` is the number of rows in which an exporter left numeric cells empty.
     """
 
     tables: list[_Table]
@@ -691,7 +699,7 @@ class _Rows:
 
     @property
     def table(self) -> _Table:
-        """All rows that have been read so far, joined into one table."""
+        """All rows that have been read so far, as a single table."""
         return _Table(*(np.concatenate(columns) for columns in zip(*self.tables, strict=True)))
 
 
@@ -715,8 +723,8 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
 def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str, rows: _Rows) -> None:
     """Read several rows at once, and add them to `rows`.
 
-    If this fails, the rows are split in halves until the unusable rows are found. Raises `PathFileError` if too many
-    rows are unusable.
+    If this fails, the rows are split into halves until the unusable rows are found. Raises `PathFileError` if too
+    many rows are unusable.
     """
     read = _plain_cells(texts, header) or _quoted_cells(texts, header)
     if read is not None and np.isfinite(read[0][:, : len(header.numbers)]).all():
@@ -751,9 +759,9 @@ def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name
 
 
 def _is_complete(text: str, header: _Header) -> bool:
-    """Whether a row has no empty cell in its columns of numbers.
+    """Whether all cells of a row that should contain numbers are filled.
 
-    A row with a wrong number of cells counts as complete here.
+    A row with a wrong number of cells also counts as complete here.
     """
     cells = _cells(text, header.delimiter)
     if isinstance(cells, str) or len(cells) != header.width:
@@ -762,7 +770,7 @@ def _is_complete(text: str, header: _Header) -> bool:
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, columns) and time stamps of rows whose cells have no quotes; None if they cannot be read.
+    """Read rows without quoted cells: numbers (n, columns) and time stamps; None if the rows cannot be read.
 
     The time stamps are None if the log has no column of time stamps.
     """
@@ -787,7 +795,7 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
 
 
 def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
-    """Numbers (n, columns) and time stamps of rows whose cells may have quotes; None if they cannot be read.
+    """Read rows that may have quoted cells: numbers (n, columns) and time stamps; None if the rows cannot be read.
 
     The time stamps are None if the log has no column of time stamps. This takes six times as long as
     `_plain_cells`.
@@ -807,9 +815,10 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
 
 
 def _or_nan(cell: str) -> float:
-    """Number in a cell of an accuracy column.
+    """Convert a cell of an accuracy column to a number.
 
-    The result is NaN for an empty cell, -1 for a word that means no value, and `_NO_NUMBER` for any other text.
+    The result is NaN for an empty cell, -1 for a word that means a missing value, and `_NO_NUMBER` for any other
+    text.
     """
     try:
         return float(cell)
@@ -819,9 +828,10 @@ def _or_nan(cell: str) -> float:
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
-    """Split time stamps into the start of their minute, in seconds from MJD 0, and the seconds within the minute. [s]
+    """Split time stamps into the start of the minute, in seconds from MJD 0, and the seconds in the minute. [s]
 
-    If the exporter omits a stamp, the start is NaN and the seconds are 0. Returns None if a text is not a time stamp.
+    If the exporter omits a time stamp, the start is NaN and the seconds are 0. Returns None if a string is not a time
+    stamp.
     """
     has_text = [bool(text) or header.vendor is None for text in texts]
     minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]
@@ -836,9 +846,9 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
 
 @lru_cache(maxsize=256)
 def _minute(text: str) -> float | None:
-    """Time from MJD 0 to the minute of a time stamp, given without its seconds; None if it is not a time stamp. [s]
+    """Time from MJD 0 to the start of the minute of a time stamp; None if the text is not a time stamp. [s]
 
-    Many rows share a minute, so results are cached.
+    `text` is the time stamp without its seconds. Many rows share a minute, so results are cached.
     """
     instant = parse_instant(f"{text}00Z")
     return None if instant is None else instant.day * DAY_S + instant.seconds
@@ -982,17 +992,20 @@ _VENDORS = (
 
 
 def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
-    """Exporter that wrote a header, recognised by the column names in the cells; None if it is unknown."""
+    """Exporter that wrote a header; None if it is unknown.
+
+    The exporter is recognised by the column names in `cells`.
+    """
     names = [cell.strip().lower() for cell in cells]
     return next((vendor for vendor in _VENDORS if vendor.signs.issubset(names)), None)
 
 
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
-    """Convert the lines of a dataflash log to CSV with a header and GPS rows; other logs are unchanged.
+    """Convert a dataflash log to CSV with a header and GPS rows; any other log is returned unchanged.
 
-    The FMT row that names the columns of GPS rows becomes the header. GPS rows stay. All other lines become empty, so
-    that each line keeps its number. Two cells are appended to a GPS row: HAcc and VAcc from the GPA row with the same
-    time and receiver.
+    The FMT row that names the columns of GPS rows becomes the header. GPS rows are kept. All other lines become
+    empty, so that line numbers do not change. Two cells are appended to each GPS row: HAcc and VAcc from the GPA row
+    with the same time and receiver.
     """
     if not any(line.startswith("FMT,") for line in lines[:100]):
         return lines

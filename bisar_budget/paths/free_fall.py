@@ -35,11 +35,11 @@ class FreeFall:
     centre : Vectors
         Position of the Earth's centre. [m]
     rotation : Vectors
-        Inertial rotation rate of the axes, along the Earth's axis. [rad/s] It is zero for a scene without a position
+        Inertial rotation rate of the axes, along the Earth's axis [rad/s]. It is zero for a scene without a position
         on the Earth; the Earth is then a sphere.
     share : float or (cases,)
-        1 in cases with a platform in free fall, and 0 in all other cases, in which the position error is p + vτ +
-        aτ²/2, without gravity and rotation.
+        1 in cases in which the platform is in free fall, and 0 in all other cases. In the latter, the position error
+        is p + vτ + aτ²/2, without gravity and rotation.
     """
 
     centre: Vectors
@@ -61,16 +61,16 @@ class FreeFall:
         Returns
         -------
         (3, 3, 3, nodes, cases)
-            Position errors. [m] The array is indexed by the unit error (1 m of position, 1 m/s of velocity, 1 m/s²
+            Position errors [m]. The axes of the array are: the unit error (1 m of position, 1 m/s of velocity, 1 m/s²
             of acceleration), the axis of this error, the component (east, north, up), the slow time and the case. The
             velocity error is the rate of change of the position error in the axes of the scene. The acceleration
             error is constant in these axes.
 
         Notes
         -----
-        Derived here. In axes that turn at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a with the gravity gradient G.
-        The acceleration is approximated by a polynomial that satisfies the equation at Gauss-Legendre nodes. Its
-        values at the nodes are the solution of one linear system per case.
+        The method was derived for this program. In axes that rotate at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a
+        with the gravity gradient G. The acceleration δr̈ is approximated by a polynomial that satisfies the equation
+        at Gauss-Legendre nodes. Its values at the nodes are the solution of a linear system for each case.
         """
         collocation = _collocation()
         cases, count = half.size, collocation.times.size
@@ -97,9 +97,10 @@ class FreeFall:
 
         G is the gravity gradient, and ω the rotation rate of the axes. `times` are slow times (nodes, cases). [s]
 
-        Derived here. G is the second derivative of the potential of `earth.free_fall`. With the direction p of the
-        Earth's axis, s = r̂·p and the equatorial radius R, the sphere has μ/r³·(3r̂r̂ᵀ − 1), and the flattening adds
-        −μ/r³·(3/2)J₂(R/r)²·[1 − 5s² − (5 − 35s²)r̂r̂ᵀ − 10s(r̂pᵀ + pr̂ᵀ) + 2ppᵀ].
+        G is the second derivative of the potential of `earth.free_fall`; it was derived for this program. With the
+        direction p of the Earth's axis, s = r̂·p and the equatorial radius R, the spherical Earth contributes
+        μ/r³·(3r̂r̂ᵀ − 1), and the flattening adds −μ/r³·(3/2)J₂(R/r)²·[1 − 5s² − (5 − 35s²)r̂r̂ᵀ − 10s(r̂pᵀ + pr̂ᵀ) +
+        2ppᵀ].
         """
         share = np.broadcast_to(self.share, (cases,))
         offset = np.stack(
@@ -127,10 +128,10 @@ class FreeFall:
         return gravity, spin
 
     def rate_against_stars(self, position: Vectors) -> Vectors:
-        """Rate of change −ω×p, in scene axes, of a position error p that is constant in inertial axes.
+        """Rate of change −ω×p, in the axes of the scene, of a position error p that is constant in inertial space.
 
-        ω is the rotation rate of the scene axes. The result is in m/s for `position` in m, and in 1/s for a unit
-        vector.
+        ω is the rotation rate of the axes of the scene. The result is in m/s for `position` in m, and in 1/s for a
+        unit vector.
         """
         x, y, z = cross(self.rotation, position)
         return (-x * self.share, -y * self.share, -z * self.share)
@@ -145,7 +146,7 @@ class FreeFall:
         return (a / square, b / square, c / square)
 
     def of(self, cases: Any) -> "FreeFall":
-        """Dynamics for a selection of the cases; `cases` are the indices of these cases."""
+        """Select the dynamics for some cases by their indices `cases`."""
 
         def chosen(number: PerCase) -> PerCase:
             return number[cases] if isinstance(number, np.ndarray) and number.ndim else number
@@ -159,8 +160,8 @@ class FreeFall:
 def of_scene(axes: SceneAxes | None) -> FreeFall:
     """Dynamics of free fall in the axes of a scene.
 
-    If `axes` is None, the scene has no position on the Earth. Then the Earth's centre is one Earth radius below the
-    scene centre, and the axes do not turn.
+    If `axes` is None, the scene has no position on the Earth. The Earth's centre is then one Earth radius below the
+    scene centre, and the axes do not rotate.
     """
     if axes is None:
         return FreeFall((0.0, 0.0, -EARTH_RADIUS_M), (0.0, 0.0, 0.0))
@@ -168,10 +169,11 @@ def of_scene(axes: SceneAxes | None) -> FreeFall:
 
 
 def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
-    """Dynamics of the errors of a path, if it is in free fall above a height of 100 km; None for any other path.
+    """Dynamics of the errors of a path that is in free fall above a height of 100 km; None for any other path.
 
-    A path is in free fall if its acceleration differs from that of free fall by at most 5 % of gravity, μ/r². The
-    coordinates of the path may be arrays (cases,). Then `share` of the result indicates which cases are in free fall.
+    A path is in free fall if its acceleration differs from the acceleration in free fall by at most 5 % of gravity,
+    μ/r². The coordinates of the path may be arrays (cases,); `share` of the result then tells which cases are in free
+    fall.
     """
     height, departure = departure_of(path, axes)
     falls = (height > LEAST_FALLING_HEIGHT_M) & (departure <= FREE_FALL_FRACTION)
@@ -182,9 +184,9 @@ def fall_of(path: PlatformState, axes: SceneAxes | None) -> FreeFall | None:
 
 
 def departure_of(path: PlatformState, axes: SceneAxes | None) -> tuple[PerCase, PerCase]:
-    """Height of a path above a spherical Earth [m], and departure of its acceleration from that of free fall.
+    """Height of a path above a spherical Earth [m], and the difference of its acceleration from free fall.
 
-    The departure is a fraction of gravity, μ/r². Both are numbers, or arrays (cases,).
+    The difference is given as a fraction of gravity, μ/r². Both results are numbers, or arrays (cases,).
     """
     centre = of_scene(axes).centre
     x, y, z = (component - origin for component, origin in zip(path.position, centre, strict=True))
@@ -196,11 +198,11 @@ def departure_of(path: PlatformState, axes: SceneAxes | None) -> tuple[PerCase, 
 
 @dataclass(frozen=True, eq=False)
 class _Collocation:
-    """Gauss-Legendre nodes (N,) over -1 … 1, and matrices (N, N) that integrate values at the nodes.
+    """N Gauss-Legendre nodes from -1 to 1, and matrices (N, N) to integrate a function from its values at the nodes.
 
-    `times` are the nodes. Multiplied by values at the nodes, `once` and `twice` give the single and the double
-    integral from 0 to each node, and `to_coefficients` gives the Legendre coefficients of the polynomial through the
-    values.
+    `times` (N,) are the nodes. Multiplied by the values of the function, `once` and `twice` give its single and
+    double integrals from 0 to each node. `to_coefficients` gives the Legendre coefficients of the polynomial through
+    the values.
     """
 
     times: Floats
@@ -209,18 +211,21 @@ class _Collocation:
     to_coefficients: Floats
 
     def twice_at(self, places: Floats) -> Floats:
-        """Matrix (places, N) that converts values at the nodes to double integrals from 0 to the times `places`."""
+        """Matrix (places, N) that converts values at the N nodes to double integrals from 0 to the times `places`."""
         return _integral(places, 2) @ self.to_coefficients
 
 
 def _integral(places: Floats, times: int) -> Floats:
-    """Evaluate the `times`-fold integrals from 0 of the first N Legendre polynomials at `places`; (places, N)."""
+    """Multiple integrals (places, N) of the first N Legendre polynomials from 0 to `places`.
+
+    Each polynomial is integrated `times` times.
+    """
     return np.asarray(np.polynomial.legendre.legvander(places, _NODE_COUNT - 1 + times) @ _integrated(times))
 
 
 @cache
 def _integrated(times: int) -> Floats:
-    """Legendre coefficients of the `times`-fold integrals from 0 of the first N Legendre polynomials.
+    """Legendre coefficients of the first N Legendre polynomials, each integrated `times` times from 0.
 
     Each column of the result belongs to one polynomial.
     """

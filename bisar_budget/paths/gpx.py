@@ -1,13 +1,14 @@
-"""Tracks of GPX 1.0 and 1.1: points with time and elevation, in one or several segments in chronological order.
+"""Reader of GPX 1.0 and 1.1: tracks of points with time and elevation, in segments in chronological order.
 
     <trkpt lat="48.086600" lon="11.279700"><ele>2953.1</ele><time>2026-06-01T05:20:01.250Z</time>
     <geoidheight>46.9</geoidheight></trkpt>
 
 An elevation is above mean sea level; `geoidheight` is the height of the geoid above the ellipsoid. Times are in UTC,
-or have an offset from UTC. A `fix` of `none` or `2d` means that a point has no position or no height, respectively.
+or have an offset from UTC. A point whose `fix` is `none` has no position, and a point whose `fix` is `2d` has no
+height.
 
-Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. `messages.parse_markup` builds the tree: unlike
-gpxpy it refuses document types, bounds sizes and keeps line numbers.
+Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. The file is parsed by `messages.parse_markup`,
+which, unlike gpxpy, refuses document types, limits sizes and keeps line numbers.
 """
 
 import math
@@ -47,9 +48,9 @@ def is_gpx(data: bytes) -> bool:
 def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the track of a GPX file.
 
-    Arguments and errors are the same for all readers, see `LogFormat.read`. If the mission file states the time scale
-    `utc`, times may omit the time zone. If there are several tracks, the mission file may choose one by its name or
-    number. If it does not, `Log.tracks` contains all tracks that can be read, and the unreadable tracks are ignored.
+    The arguments and errors are the same for all readers; see `LogFormat.read`. If the mission file states the time
+    scale `utc`, times may omit the time zone. If there are several tracks, the mission file may choose one by its
+    name or number. If it does not, `Log.tracks` contains all tracks that can be read; unreadable tracks are ignored.
     """
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")
@@ -76,9 +77,10 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
 
 def _chosen(tracks: Sequence[MessageElement], track_name: str, name: str) -> int:
-    """Index, from 0, of the track that the mission file chooses.
+    """Index, counted from 0, of the track that the mission file chooses.
 
-    `track_name` is the name of a track. If no track has this name, it is read as the number of a track, from 1.
+    `track_name` is the name of a track. If no track has this name, it is read as the number of a track, counted from
+    1.
     """
     matches = [number for number, track in enumerate(tracks) if _name_of(track) == track_name.strip()]
     if len(matches) == 1:
@@ -105,7 +107,10 @@ def _track_words(tracks: Sequence[MessageElement], index: int) -> str:
 
 
 def _read_track(track: MessageElement, track_words: str, name: str, keys: LogKeys) -> Log:
-    """Make the log of a track. Points without a fix in three dimensions, and unusable points, are left out."""
+    """Make the log of a track; points without a three-dimensional fix and unusable points are left out.
+
+    `track_words` identifies the track in messages.
+    """
     points, lines, broken, without_fix = [], [], {}, 0
     for point in track.all("trkpt"):
         if any(
@@ -140,7 +145,7 @@ def _read_track(track: MessageElement, track_words: str, name: str, keys: LogKey
 def _point(point: MessageElement, name: str, keys: LogKeys) -> tuple[Instant, tuple[float, float, float, float]]:
     """Read the instant of a point, and its latitude [deg], longitude [deg], elevation [m] and geoid separation [m].
 
-    The separation is NaN if the point states none.
+    The separation is NaN if the point does not state it.
     """
     instant = _instant(point, name, keys)
     has_separation = any(child.name == "geoidheight" for child in point.children)

@@ -1,4 +1,4 @@
-"""Instants of UTC with an error below a nanosecond, and conversions to and from other time systems."""
+"""Instants in UTC with an error below a nanosecond, and conversions to and from other time systems."""
 
 import re
 from bisect import bisect_right
@@ -19,7 +19,7 @@ _MAX_OFFSET_HOURS = 18  # of a local time from UTC, the limit in common readers 
 
 
 class Instant(NamedTuple):
-    """Instant of UTC: modified Julian day, and seconds of the day.
+    """Instant in UTC: modified Julian day, and seconds of the day.
 
     Two numbers are needed for precision: at 7.5 km/s an error of 10 ns is 0.1 mm.
     """
@@ -28,16 +28,16 @@ class Instant(NamedTuple):
     seconds: float
 
     def after(self, seconds: float) -> "Instant":
-        """Add a number of seconds to the instant. Leap seconds are ignored."""
+        """Add a number of seconds to the instant, ignoring leap seconds."""
         days, remainder = divmod(self.seconds + seconds, DAY_S)
         return Instant(self.day + int(days), remainder)
 
     def since(self, other: "Instant") -> float:
-        """Time from another instant to this instant. Leap seconds are ignored. [s]"""
+        """Time from the instant `other` to this instant, ignoring leap seconds. [s]"""
         return (self.day - other.day) * DAY_S + (self.seconds - other.seconds)
 
     def as_text(self) -> str:
-        """The instant as text like 2026-06-01T05:20:31.250Z, rounded to a millisecond.
+        """Format the instant as text such as 2026-06-01T05:20:31.250Z, rounded to a millisecond.
 
         For an instant outside the years 1 to 9999, the text is the modified Julian day, such as `MJD -700000.50000`.
         """
@@ -48,19 +48,20 @@ class Instant(NamedTuple):
         return moment.strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
 
     def as_datetime(self) -> datetime:
-        """The instant as a datetime, to a microsecond; raises `OverflowError` outside the years 1 to 9999."""
+        """Convert to a datetime, rounded to a microsecond; raises `OverflowError` outside the years 1 to 9999."""
         return datetime(1858, 11, 17, tzinfo=UTC) + timedelta(days=self.day, seconds=self.seconds)
 
 
 def day_of_year(year: int, day: int) -> int | None:
-    """Modified Julian day from a year and the day of the year, counted from 1; None if the year has no such day."""
+    """Convert a year and a day of the year (from 1) to a modified Julian day; None if there is no such day."""
     return date(year, 1, 1).toordinal() - _MJD_EPOCH_DAY + day - 1 if 1 <= day <= 365 + isleap(year) else None
 
 
 def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
-    """Read an instant like 2026-06-01T05:20:31.250Z, or with an offset from UTC such as +01:00; None for other text.
+    """Read an instant such as 2026-06-01T05:20:31.250Z; None if the text is not an instant.
 
-    With `needs_zone`, the result is also None for a text without a zone.
+    The Z may be replaced by an offset from UTC such as +01:00. If `needs_zone`, the result is None for a text without
+    Z or an offset; otherwise such a text is read as UTC.
     """
     match = _ISO_8601.fullmatch(text.strip())
     if match is None or (needs_zone and not match[8]):
@@ -83,7 +84,7 @@ def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
 
 
 def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
-    """Read the time stamp of a record as `parse_instant` does; its seconds may also be 60.
+    """Read the time stamp of a record in the same way as `parse_instant`, but accept 60 as its seconds.
 
     Receivers round 59.996 s to 60.00 s. Seconds of 60 are read as the start of the next minute.
     """
@@ -111,27 +112,27 @@ TAI_LESS = {"TAI": 0.0, "GPS": 19.0, "TT": -32.184}
 
 
 def tai_less_utc(day: int) -> int:
-    """TAI - UTC on a day of UTC, from 1972 on. [s]"""
+    """TAI - UTC on a UTC day, given as a modified Julian day, from 1972 on. [s]"""
     return 9 + max(bisect_right(_LEAP_DAYS, day), 1)
 
 
 def has_leap_second(day: int) -> bool:
-    """Whether a day of UTC ends with the leap second 23:59:60."""
+    """Whether a UTC day, given as a modified Julian day, ends with the leap second 23:59:60."""
     return day + 1 in _LEAP_DAYS[1:]
 
 
 def gps_week(instant: Instant) -> int:
-    """GPS week number at an instant of UTC, counted from 1980 without rollover."""
+    """GPS week number of an instant in UTC, counted from 1980 without rollover."""
     return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH_DAY) // 7
 
 
 def tai(instant: Instant) -> Instant:
-    """Convert an instant of UTC to the day and seconds of TAI."""
+    """Convert an instant from UTC to TAI."""
     return instant.after(tai_less_utc(instant.day))
 
 
 def later(instant: Instant, seconds: float) -> Instant:
-    """Add a number of elapsed seconds to an instant of UTC. Leap seconds count as elapsed."""
+    """Add a number of elapsed seconds to an instant in UTC; leap seconds count as elapsed."""
     without_leaps = instant.after(seconds)
     if tai_less_utc(without_leaps.day) == tai_less_utc(instant.day):
         return without_leaps  # a conversion to TAI and back would round twice
@@ -139,7 +140,7 @@ def later(instant: Instant, seconds: float) -> Instant:
 
 
 def utc(tai_instant: Instant) -> Instant:
-    """Convert an instant of TAI to UTC. During a leap second the seconds of the day are 86400 s or more."""
+    """Convert an instant from TAI to UTC. During a leap second, the seconds of the day are 86400 s or more."""
     instant = tai_instant.after(-tai_less_utc(tai_instant.day))
     earlier = tai_instant.after(-tai_less_utc(instant.day))
     if earlier.day > instant.day:

@@ -1,4 +1,4 @@
-"""Checks and conversions of fixes, for all log formats: time scale, heights, ascending times, plausible motion."""
+"""Checks and conversions of fixes, for all log formats: time scale, heights, order of times, plausible motion."""
 
 import re
 from bisect import bisect_left
@@ -31,9 +31,9 @@ class LogKeys(NamedTuple):
     """Keys of a mission file that describe a log.
 
     `week` is the GPS week in which the log begins. `time_scale` is the time scale of its time stamps.
-    `geoid_separation` is the height of the geoid above the ellipsoid. [m] If a file contains several logs, one is
-    chosen by the `talker` of NMEA, by the `track` of GPX (name or number), or by the `instance` of a receiver. None
-    means that the mission file does not state the key.
+    `geoid_separation` [m] is the height of the geoid above the ellipsoid. If a file contains several logs, one of
+    them is chosen by the `talker` in NMEA, by the `track` in GPX (name or number), or by the `instance` of a
+    receiver. None means that the mission file does not state the key.
     """
 
     week: int | None = None
@@ -54,12 +54,17 @@ _NO_FAULTS: Mapping[int, str] = MappingProxyType({})
 
 
 def most_left_out(count: int) -> int:
-    """Largest number of records that a log may leave out: 1 % of its records, or one record if it has 20 to 199."""
+    """Largest number of records that may be left out of a log: 1 % of them, or one record if the log has 20 to 199.
+
+    `count` is the number of records in the log.
+    """
     return max(count // _RECORDS_PER_FAULT, int(count >= _ONE_FAULT_RECORD_COUNT))
 
 
 class LogRecords:
-    """Records of a log that have a fix, with their line or number for messages, and a mask of the usable records.
+    """Records of a log that have a fix, and which of them can be used.
+
+    A record is identified in messages by its line, or by its number.
 
     Parameters
     ----------
@@ -70,14 +75,15 @@ class LogRecords:
     lines : (count,) array_like, optional
         Lines of the records in the file, in ascending order. If omitted, records are numbered from 1.
     broken : mapping, optional
-        Messages about records that cannot be read, by their lines or numbers. They are not among the `count` records.
+        Messages about records that cannot be read, by their lines or numbers. These are not among the `count`
+        records.
     lost : int
         Number of records that are missing, because they were damaged during recording or transfer.
 
     Raises
     ------
     PathFileError
-        More records than `most_left_out` are unusable, or no record is usable. The methods `leave_out` and
+        More records than `most_left_out` allows are unusable, or no record is usable. The methods `leave_out` and
         `keep_what_rises` raise it too.
     """
 
@@ -103,19 +109,22 @@ class LogRecords:
 
     @property
     def first(self) -> int:
-        """Index of the first record that can be used."""
+        """Index of the first usable record."""
         return int(self.is_usable.argmax())
 
     def where(self, index: int) -> str:
-        """Prefix of a message about a record: the name of the file, and the line or number of the record."""
+        """Start of a message about a record: the name of the file, and the line or number of the record."""
         return f"{self.name}{':' if self._is_in_lines else ': record '}{self._numbers[index]}"
 
     def words(self, index: int) -> str:
-        """Text that refers to a record in a message, such as `line 12` or `record 12`."""
+        """Phrase that refers to a record in a message, such as `line 12` or `record 12`."""
         return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
     def leave_out(self, is_unusable: Booleans | np.bool_, reason: Callable[[int], str]) -> None:
-        """Mark records (count,) as unusable; `reason` gives the reason for the record with a given index."""
+        """Mark records as unusable; `is_unusable` (count,) selects them.
+
+        `reason` takes the index of a record, and returns the reason why it is unusable.
+        """
         indices = np.flatnonzero(is_unusable & self.is_usable)
         if indices.size:
             self.is_usable[indices] = False
@@ -125,7 +134,10 @@ class LogRecords:
             )
 
     def keep_what_rises(self, times: Floats, start: Instant | None) -> None:
-        """Drop records to make `times` (count,) strictly ascending; they are counted from `start`. [s]"""
+        """Mark records as unusable so that the times of the remaining records are strictly ascending.
+
+        `times` (count,) are counted from `start`. [s]
+        """
         indices = np.flatnonzero(self.is_usable)
         usable_times = times[indices]
         steps = np.diff(usable_times)
@@ -163,7 +175,7 @@ class LogRecords:
         self.leave_out(is_unusable, lambda index: not_after(row_of_index[index]))
 
     def left_out(self) -> LeftOut | None:
-        """Records that are left out, with messages about them; None if all records are used."""
+        """Records that are left out, and messages about them; None if all records are used."""
         if not self._faults:
             return None
         numbers = sorted(self._faults)
@@ -171,7 +183,7 @@ class LogRecords:
         return LeftOut(before, tuple(self._faults[number] for number in numbers))
 
     def left_out_words(self) -> str:
-        """Note with the number of records that are left out, and their lines or numbers; empty if all are used."""
+        """Phrase with the number of records that are left out, and their lines or numbers; empty if all are used."""
         if not self._faults:
             return ""
         numbers = sorted(self._faults)
@@ -180,9 +192,10 @@ class LogRecords:
         return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
 
     def _add(self, faults: Mapping[int, str], count: int) -> None:
-        """Add `count` records to the records that are left out; raises `PathFileError` if there are now too many.
+        """Count `count` more records as left out; raises `PathFileError` if there are now too many.
 
-        `faults` are messages, by line or number, about all of these records or about the first ones.
+        `faults` are messages about these records, by line or number; if there are very many, only the first ones have
+        a message.
         """
         self._faults |= faults
         unusable = len(self._faults) - len(faults) + count + self._lost
@@ -194,9 +207,9 @@ class LogRecords:
 
 
 def _longest_rise(times: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) that selects the longest strictly increasing subsequence of times (n,).
+    """Mask (n,) that selects the longest strictly increasing subsequence of `times` (n,).
 
-    The subsequence can contain only the first of several equal times.
+    Of several equal times, only the first can be selected.
     """
     rises = np.ones(len(times), dtype=bool)
     highest = np.maximum.accumulate(times)
@@ -229,9 +242,9 @@ def _longest_rise(times: Floats) -> NDArray[np.bool_]:
 
 
 def _whole_seconds(times: Floats, start: Instant | None) -> str:
-    """Explanation of repeated times, for a message: the recorder truncates times to whole seconds.
+    """Explanation for a message about repeated times: the recorder truncates times to whole seconds.
 
-    The text is empty if the times do not indicate such a truncation.
+    The explanation is empty if the times do not indicate such a truncation.
     """
     seconds = times + (start.seconds if start else 0.0)
     fixes_per_stamp = len(times) / max(len(np.unique(times)), 1)
@@ -248,7 +261,7 @@ def _whole_seconds(times: Floats, start: Instant | None) -> str:
 
 
 def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
-    """Refuse a mission file whose time scale differs from the scale that the log states."""
+    """Raise `PathFileError` if the mission file states a time scale that differs from the time scale of the log."""
     if keys.time_scale not in (None, log_scale):
         raise PathFileError(
             f"{name}: counts in {SCALES[log_scale]}, and trajectory.time_scale says "
@@ -260,10 +273,11 @@ def hold_to_scale(log_scale: str, keys: LogKeys, name: str) -> None:
 
 
 def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float:
-    """Instance (number) of the receiver whose fixes are read: the one that the mission file chooses, or the only one.
+    """Number of the receiver whose fixes are read: the receiver that the mission file chooses, or the only receiver.
 
-    `counts` is the number of fixes of each instance. Raises `PathFileError` if the chosen instance has no fix, or if
-    there are several instances and no choice.
+    `counts` maps the number of each receiver, which is called its instance, to its number of fixes. Raises
+    `PathFileError` if the chosen receiver has no fix, or if there are several receivers and the mission file does not
+    choose one.
     """
     listed = ", ".join(f"{instance:g} with {count}" for instance, count in sorted(counts.items()))
     if keys.instance is not None and keys.instance not in counts:
@@ -278,23 +292,23 @@ def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float
 
 
 def is_wgs84(datum: str) -> bool:
-    """Whether a datum or reference system with the name `datum` is WGS-84 or a frame of the ITRF."""
+    """Whether the datum or reference system with the name `datum` is WGS-84 or an ITRF frame."""
     return _WGS84.fullmatch(datum.strip()) is not None
 
 
 def utc_of(instant: Instant, scale: str) -> Instant:
-    """Convert an instant to UTC from `scale`, a key of `SCALES`."""
+    """Convert an instant from the time scale `scale`, which is a key of `SCALES`, to UTC."""
     return instant if scale == "utc" else utc(instant.after(TAI_LESS[scale.upper()]))
 
 
 def unix_instant(unix_us: int) -> Instant:
-    """Instant of UTC from microseconds since 1970-01-01."""
+    """Convert microseconds since 1970-01-01 to an instant in UTC."""
     days, microseconds = divmod(unix_us, 86_400_000_000)
     return Instant(UNIX_EPOCH_DAY + days, microseconds * 1e-6)
 
 
 def scale_words(start: Instant, scale: str) -> str:
-    """Note on the difference between UTC and the time scale of a log at its start; empty for a log in UTC."""
+    """Phrase with the difference between UTC and the time scale of a log, at its start; empty for a log in UTC."""
     if scale == "utc":
         return ""
     system = scale.upper()
@@ -303,9 +317,9 @@ def scale_words(start: Instant, scale: str) -> str:
 
 
 def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights above the ellipsoid") -> None:
-    """Refuse a mission file that states a geoid separation for a log that does not need it.
+    """Raise `PathFileError` if the mission file states a geoid separation although the log does not need it.
 
-    `log_words` is the reason why the log does not need it, for the message.
+    `log_words` states the reason why the log does not need it, for the error message.
     """
     if keys.geoid_separation is not None:
         raise PathFileError(
@@ -316,10 +330,10 @@ def hold_to_ellipsoid(keys: LogKeys, name: str, log_words: str = "has heights ab
 
 
 def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, name: str) -> Floats:
-    """Convert heights (n,) above mean sea level, which is the geoid, to heights above the WGS-84 ellipsoid. [m]
+    """Convert heights (n,) above mean sea level, that is, above the geoid, to heights above the WGS-84 ellipsoid. [m]
 
-    The geoid separation, which is the height of the geoid above the ellipsoid, comes from the log (n,) or from the
-    mission file. Raises `PathFileError` if both give a separation, or neither.
+    The geoid separation is the height of the geoid above the ellipsoid. It comes from the log (n,) or from the
+    mission file. Raises `PathFileError` if both state a separation, or if neither does.
     """
     if separations is not None:
         hold_to_ellipsoid(keys, name, "gives the geoid separation itself")
@@ -331,9 +345,9 @@ def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, n
 
 
 def needs_separation(problem: str) -> PathFileError:
-    """Make the error for a log without heights above the ellipsoid and without a geoid separation.
+    """Make the error for a log that has neither heights above the ellipsoid nor a geoid separation.
 
-    It names the key of the mission file that gives the geoid separation.
+    The error names the key of the mission file that states the geoid separation.
     """
     return PathFileError(
         problem,
@@ -343,10 +357,10 @@ def needs_separation(problem: str) -> PathFileError:
 
 
 def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up from a horizontal and a vertical accuracy. [m]
+    """1-sigma errors (n, 3) east, north, up from a horizontal and a vertical accuracy. [m]
 
-    A horizontal accuracy (n,) has no direction. The whole error may lie along one axis, so the accuracy is used for
-    both the east and the north axis. If only one of the two accuracies is known, it is used for all axes. Numbers
+    A horizontal accuracy (n,) has no direction. The whole error may lie along a single axis, so the accuracy is used
+    for both the east and the north axis. If only one of the two accuracies is known, it is used for all axes. Numbers
     that are not positive count as unknown. Returns None if no number is positive.
     """
     if horizontal is None:
@@ -360,18 +374,18 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 
 
 def known_sigmas(sigmas: Floats) -> Floats | None:
-    """Replace one-sigma errors (n, 3) that are not positive by NaN; None if no error is positive. [m]
+    """Replace 1-sigma errors (n, 3) that are not positive by NaN; returns None if no error is positive. [m]
 
-    Errors above 1000 km, which receivers write without a fix, are reduced to 1000 km.
+    Errors above 1000 km, which receivers write if they have no fix, are reduced to 1000 km.
     """
     found = np.where(sigmas > 0, np.minimum(sigmas, _MAX_LOG_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
 
 
 def filled_sigmas(sigmas: Floats) -> Floats:
-    """Replace unknown one-sigma errors (…, 3) by the largest known error of the same position. [m]
+    """Replace unknown 1-sigma errors (…, 3) by the largest known error of the same position. [m]
 
-    The unknown error may be as large as the known one, and must not count as 0.
+    An unknown error may be as large as the known error, and must not count as 0.
     """
     return np.where(sigmas > 0, sigmas, np.fmax.reduce(sigmas, axis=-1, keepdims=True))
 
@@ -385,11 +399,12 @@ def geodetic_log(
     coordinates: tuple[Floats, Floats, Floats],
     sigmas: Floats | None = None,
 ) -> Log:
-    """Make a log from geodetic coordinates: latitude, longitude [rad], height above the ellipsoid [m], each (n,).
+    """Make a log from geodetic coordinates.
 
-    `words` describes the log for reports. `times` (n,) are counted from `start`, an instant in the time scale
-    `scale`, which is a key of `SCALES`. [s] Without `start`, they are counted from an unknown instant. `sigmas` (n,
-    3) are one-sigma errors east, north, up. [m] Records with impossible coordinates, or with times out of order, are
+    `coordinates` are latitude and longitude [rad], and height above the ellipsoid [m], each with the shape (n,).
+    `words` describes the log for reports. `times` (n,) are counted in seconds from `start`, an instant in the time
+    scale `scale`, which is a key of `SCALES`. Without `start`, they are counted from an unknown instant. `sigmas` (n,
+    3) [m] are 1-sigma errors east, north, up. Records with impossible coordinates, or with times out of order, are
     left out. Raises `PathFileError` if too many records are left out.
     """
     latitude, longitude, height = coordinates
@@ -433,11 +448,11 @@ def usable_log(
     sigmas: Floats | None = None,
     geodetic: Sequence[Floats] | None = None,
 ) -> Log:
-    """Make a log from the usable records whose times are in ascending order.
+    """Make a log from the usable records; records whose times are out of order are left out.
 
-    `positions_of` is a function that returns the positions (m, 3) [m] of the m records selected by a mask (n,).
+    The function `positions_of` takes a mask (n,) that selects m records, and returns their positions (m, 3) [m].
     `clock_words` is a note on the accuracy of the times. `geodetic` are latitude, longitude and height of each
-    record, if the log has them. The other parameters are as in `geodetic_log`.
+    record, if the log states them. The other parameters are the same as in `geodetic_log`.
     """
     start_utc = None if start is None else utc_of(start, scale)
     records.keep_what_rises(times, start_utc)
@@ -466,7 +481,7 @@ def usable_log(
 
 
 def counted(number: int, noun: str = "fix") -> str:
-    """Format a number and a noun, in the plural if needed."""
+    """Format a number followed by a noun, which is put into the plural if needed."""
     return f"{number} {noun}" + ("" if number == 1 else "es" if noun.endswith("x") else "s")
 
 
@@ -489,7 +504,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Parameters
     ----------
     times : (n,) ndarray
-        Slow times, in ascending order; fixes far outside the stretch are ignored. [s]
+        Slow times, in ascending order; fixes far outside the time span that is used are ignored. [s]
     positions : (n, 3) ndarray
         Positions of the fixes in any axes. [m]
     stretch_s : float
@@ -500,7 +515,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
     Raises
     ------
     PathFileError
-        The log has one of three faults. First, all fixes in the stretch are equal to within 1 mm. Second, a fix is
+        The log has one of three faults. First, all fixes in the time span are equal to within 1 mm. Second, a fix is
         repeated for so long that the platform, at its mean speed, moves by more than 0.1 m in this time. Third, a
         step between two fixes differs too much from the median of the seven steps around it: by more than 0.1 m, by
         more than an acceleration of 3 g can cause, and by more than 20 times the median of such differences.
@@ -526,7 +541,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
 def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: str) -> None:
     """Refuse a log that repeats a fix while the platform moves.
 
-    `extent` is the distance that the platform moves over the whole duration of the fixes. [m]
+    `extent` is the distance that the platform moves during the whole time span of the fixes. [m]
     """
     is_repeated = np.linalg.norm(np.diff(positions, axis=0), axis=1) <= _SAME_FIX_M
     if not is_repeated.any():
@@ -547,7 +562,10 @@ def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: st
 
 
 def _hold_to_small_steps(times: Floats, positions: Floats, half: float, name: str) -> None:
-    """Refuse a log in which a step between neighbouring fixes is too large, compared with the steps around it."""
+    """Refuse a log in which a step between neighbouring fixes is too large compared with the steps around it.
+
+    `half` is half the length of the time span around mid-aperture that is checked. [s]
+    """
     steps = np.diff(times)
     velocities = np.diff(positions, axis=0) / steps[:, None]
     padded = np.pad(velocities, ((_NEIGHBOUR_STEPS, _NEIGHBOUR_STEPS), (0, 0)), mode="reflect")

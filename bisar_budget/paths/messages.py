@@ -1,4 +1,4 @@
-"""Helpers to read orbit files and logs: text, times, numbers, and XML as a tree of elements with line numbers.
+"""Helpers for readers of orbit files and logs: text, times, numbers, and XML as a tree with line numbers.
 
 XML files may come from untrusted sources, so references are not followed, and entities are not expanded.
 """
@@ -22,16 +22,17 @@ _DECIMAL_PATTERN = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
-    """Refuse a file larger than `MAX_MARKUP_BYTES`.
+    """Raise `PathFileError` if a file is larger than `MAX_MARKUP_BYTES`.
 
-    The message advises the user to keep only the needed part of the file. `part` names this part, such as "objects".
+    The error message advises the user to keep only the part of the file that is needed. `part` names this part, such
+    as "objects".
     """
     if size > MAX_MARKUP_BYTES:
         raise PathFileError(f"{name}: is larger than {MAX_MARKUP_BYTES // 1_000_000} MB; keep the {part} needed")
 
 
 def decoded(data: bytes, name: str) -> str:
-    """Decode the bytes of a file from UTF-8 to text; raises `PathFileError` if they are not UTF-8."""
+    """Decode the content of a file as UTF-8; raises `PathFileError` if it is not UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -40,14 +41,15 @@ def decoded(data: bytes, name: str) -> str:
 
 
 def is_markup(data: bytes) -> bool:
-    """Whether a file is XML: its first character that is not blank is <."""
+    """Whether a file is XML, that is, whether its first character that is not blank is `<`."""
     return data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
 
 
 def epoch_in(text: str) -> Instant | None:
-    """Read an instant from a calendar date, or from a year and a day of the year; None for any other text.
+    """Read an instant from a date and a time of day; None if the text is not an instant.
 
-    The forms are the ASCII time codes A and B of CCSDS 301.0-B.
+    The date is a calendar date, or a year and a day of the year. The accepted formats are the ASCII time codes A and
+    B of CCSDS 301.0-B.
     """
     text = text.strip()
     match = re.fullmatch(r"(\d{4})-(\d{3})(T.*)", text, re.ASCII)
@@ -76,8 +78,8 @@ def number_in(text: object) -> float | None:
 def coordinate_in(text: str, location: str, requirement: str) -> float:
     """Read a coordinate of a position or velocity from a string.
 
-    Raises `PathFileError` with the message `requirement` if the string is not a number, or if its magnitude exceeds
-    1e9.
+    Raises `PathFileError` if the string is not a number, or if its magnitude exceeds 1e9. `requirement` is the text
+    of this error.
     """
     number = number_in(text)
     if number is None or abs(number) > _MAX_COORDINATE_LEVEL:
@@ -91,7 +93,10 @@ _MAX_LIST_CHARACTERS = 400
 
 
 class _Named(Protocol):
-    """Data about an object, such as a satellite: its name in messages, and names by which a mission may choose it."""
+    """Data about an object, such as a satellite.
+
+    `object` is its name in messages, and `names` are the names by which a mission may choose it.
+    """
 
     @property
     def object(self) -> str: ...
@@ -112,7 +117,7 @@ def object_key(text: str) -> str:
 def one_object(
     blocks: Sequence[_Candidate], name: str, object_name: str | None, number: str = "OBJECT_ID"
 ) -> Sequence[_Candidate]:
-    """Select the blocks of a file that are about one object: the object with a given name, or the only object.
+    """Select the blocks of a file that describe a single object: the object with a given name, or the only object.
 
     A block is an element set or a segment of an ephemeris. The last of an object's `names` is unique to the object;
     `number` is the term for this name in messages. Raises `PathFileError` if there is no such object, or if there are
@@ -139,7 +144,7 @@ def _listed(objects: Sequence[_Named]) -> str:
 
 
 def cut(text: str) -> str:
-    """Shorten a text that lists names to 400 characters, so that it fits into a message."""
+    """Shorten a list of names to 400 characters, so that it fits into a message."""
     return text if len(text) <= _MAX_LIST_CHARACTERS else f"{text[:_MAX_LIST_CHARACTERS]}..."
 
 
@@ -152,7 +157,7 @@ _MAX_ELEMENT_CHARACTERS = 10_000  # in the text of an element
 
 @dataclass(eq=False, slots=True)
 class MessageElement:
-    """An XML element: name without namespace, line where it begins, units, text, children and attributes."""
+    """An XML element: its name without namespace, the line where it begins, units, text, children and attributes."""
 
     name: str
     line: int
@@ -162,7 +167,7 @@ class MessageElement:
     attributes: Mapping[str, str] = field(default_factory=lambda: _NO_ATTRIBUTES)
 
     def all(self, name: str) -> Iterator["MessageElement"]:
-        """All elements with a given name below this element, in the order of the file."""
+        """Yield all elements with a given name inside this element, in the order of the file."""
         for child in self.children:
             if child.name == name:
                 yield child
@@ -171,12 +176,12 @@ class MessageElement:
 
 
 def parse_markup(data: bytes, name: str) -> MessageElement:
-    """Parse XML to a tree of elements.
+    """Parse XML into a tree of elements, and return the root of the tree.
 
     Raises
     ------
     PathFileError
-        The text is not XML, declares a document type, or has too many elements.
+        The content is not XML, declares a document type, or has too many elements.
     """
     parser = expat.ParserCreate()
     parser.buffer_text = True

@@ -5,17 +5,17 @@
     $GNGST,052001.25,0.012,0.011,0.008,45.0,0.010,0.008,0.020*7C
 
 The height in a sentence is above mean sea level. The geoid separation in the same sentence converts it to a height
-above the ellipsoid. Sentences may be mixed with other lines, and may follow other text on their line. All fixes come
-from one talker.
+above the ellipsoid. The log may have other lines between the sentences, and other text before a sentence on its line.
+All fixes come from a single talker, which is named by the first two letters of a sentence.
 
-A sentence with a wrong or missing checksum is left out and counted. A DTM sentence of this kind is left out only if
-the talker has another DTM sentence with a correct checksum. GST states one-sigma errors of latitude, longitude and
-height. Some receivers state only the semi-major axis of the horizontal error ellipse. DTM states the datum, which has
-to be W84. Without a date, the times of fixes are times of day.
+A sentence with a wrong or missing checksum is left out and counted. For a DTM sentence, this applies only if the
+talker has another DTM sentence with a correct checksum. GST states 1-sigma errors of latitude, longitude and
+height. Some receivers state only the semi-major axis of the horizontal error ellipse. DTM states the datum, which
+must be W84. Without a date, the times of fixes are times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
-time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
-parses them.
+time of day is within half a day of the date that precedes it). The fields of GNS, GST and DTM have the same meanings
+as in the package pynmea2.
 """
 
 import math
@@ -65,9 +65,9 @@ _GST_REACH_S = 5.0  # largest time from a fix to a GST that applies to it; recei
 
 
 class _Quality(NamedTuple):
-    """Quality of a fix as the receiver states it: a text for reports, and the typical one-sigma error. [m]
+    """Quality of a fix as stated by the receiver: a description for reports, and the typical 1-sigma error. [m]
 
-    The text begins with the kind of sentence that states the quality.
+    The description begins with the kind of sentence that states the quality.
     """
 
     words: str
@@ -98,7 +98,7 @@ _MODES = {
 class _Fix(NamedTuple):
     """A fix: line of the sentence, second of the day, latitude and longitude [rad], height and geoid separation [m].
 
-    The separation is NaN if the sentence states none.
+    The separation is NaN if the sentence does not state it.
     """
 
     line: int
@@ -110,16 +110,16 @@ class _Fix(NamedTuple):
     quality: _Quality
 
     def distance(self, other: "_Fix") -> float:
-        """Distance to another fix, by an approximation for short distances. [m]"""
+        """Approximate distance to a fix that is close to this fix. [m]"""
         north = EQUATORIAL_RADIUS_M * (self.latitude - other.latitude)
         turned = math.remainder(self.longitude - other.longitude, 2 * math.pi)
         return math.hypot(north, EQUATORIAL_RADIUS_M * math.cos(self.latitude) * turned, self.height - other.height)
 
 
 class _Accuracy(NamedTuple):
-    """A GST sentence: line, second of the day, and one-sigma errors east, north and up [m]; NaN for unknown errors.
+    """A GST sentence: line, second of the day, and 1-sigma errors east, north and up [m].
 
-    `unusable` is the number of values in the sentence that are not valid errors.
+    An unknown error is NaN. `unusable` is the number of values in the sentence that are not valid errors.
     """
 
     line: int
@@ -135,7 +135,7 @@ class _Accuracy(NamedTuple):
 
 
 class _Datum(NamedTuple):
-    """Datum of a DTM sentence: its code, the offsets from a reference datum, and the code of that datum."""
+    """Datum stated by a DTM sentence: its code, its offsets from a reference datum, and the reference's code."""
 
     code: str
     offsets: tuple[str, str, str]
@@ -144,7 +144,7 @@ class _Datum(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Description of the datum and its offsets, as part of a message."""
+        """Description of the datum and its offsets, for a message."""
         north, east, up = (shown(offset) for offset in self.offsets)
         code_words = {"999": "a user datum (999)", "": "a datum without a code"}
         if self.reference in _REFERENCES:
@@ -156,16 +156,16 @@ class _Datum(NamedTuple):
 
 
 def is_nmea(data: bytes) -> bool:
-    """Whether the first megabyte of a file has a sentence with a checksum that states a position or a date."""
+    """Whether a sentence in the first megabyte of a file has a checksum, and states a position or a date."""
     return bool(_ANYWHERE.search(data[:1_000_000]))
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read an NMEA 0183 log of at most `MAX_NMEA_BYTES` bytes.
 
-    Arguments and errors are the same for all readers, see `LogFormat.read`. The fixes come from GGA or GNS sentences,
-    whichever are more numerous. If both exist, their positions must agree, and the worse quality is used. The package
-    pynmea2 is required.
+    The arguments and errors are the same for all readers; see `LogFormat.read`. The fixes come from GGA or GNS
+    sentences, whichever are more numerous. If a log has both, their positions must agree, and the worse quality is
+    used. The package pynmea2 is required.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, MAX_NMEA_BYTES, name)
@@ -179,12 +179,13 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
 
 @dataclass(eq=False)
 class _Sentences:
-    """Content of all sentences of a log that are used.
+    """Content of all sentences that are used from a log.
 
-    Fixes are grouped by talker and kind of sentence; dates, accuracies and datums are grouped by talker. Dates and
-    datums come with their lines. `broken` are messages about unusable fixes, by line. `undated` are messages about
-    invalid dates. `lost` counts sentences with a wrong checksum. `doubtful_datums` are the datums of DTM sentences
-    with a wrong checksum. `unusable` counts invalid values in GST sentences by talker.
+    A talker is named by the first two letters of a sentence. Fixes are grouped by talker and kind of sentence; dates,
+    accuracies and datums are grouped by talker. Dates and datums are stored with their lines. `broken` contains
+    messages about unusable fixes, by line. `undated` contains messages about invalid dates. `lost` counts sentences
+    with a wrong checksum. `doubtful_datums` are the datums of DTM sentences with a wrong checksum. `unusable` counts
+    invalid values in GST sentences by talker.
     """
 
     fixes: defaultdict[tuple[str, str], list[_Fix]]
@@ -198,7 +199,7 @@ class _Sentences:
     unusable: Counter[str]
 
     def talker_of_fixes(self, keys: LogKeys, name: str) -> str:
-        """Talker whose fixes are read: the talker named in the mission file, or else the only talker with fixes."""
+        """Talker whose fixes are read: the talker that the mission file chooses, or the only talker with fixes."""
         counts = Counter[str]()
         for (talker, _), fixes in self.fixes.items():
             counts[talker] += len(fixes)
@@ -222,22 +223,22 @@ class _Sentences:
         return next(iter(+counts))
 
     def _words(self, talker: str) -> str:
-        """Text with the two most frequent qualities of a talker's fixes, and the number of fixes of each."""
+        """Phrase with the two most frequent qualities of a talker's fixes, and the number of fixes of each."""
         of_talker = (fix.quality.words for kind in _FIX_SENTENCES for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
     def other_receivers(self, talker: str) -> set[str]:
-        """Talkers with fixes, except the given talker.
+        """All talkers with fixes other than `talker`.
 
-        They are separate receivers, so the datums and accuracies that they state do not apply to the given talker.
+        They are separate receivers, so the datums and accuracies that they state do not apply to `talker`.
         """
         return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
 
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse a log whose datum is not WGS-84.
 
-        The datums stated by the talker are checked, and also the datums stated by talkers without fixes, which are
-        further names of the same receiver.
+        The datums stated by `talker` are checked. The datums stated by talkers without fixes are also checked,
+        because such talkers are further names of the same receiver.
         """
         # DTM sentences with a wrong checksum count if a talker has no others: without them, WGS-84 would be assumed.
         datums = {**self.doubtful_datums, **self.datums}
@@ -253,9 +254,9 @@ class _Sentences:
                     )
 
     def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
-        """Refuse GGA and GNS sentences whose positions come from two different solutions.
+        """Refuse a log in which GGA and GNS sentences have positions from two different solutions.
 
-        If the solutions agree, each fix of `kind` gets the worse quality of the two sentences for the same time.
+        If the positions agree, each fix of `kind` gets the worse quality of the two sentences for the same time.
         """
         other_kind = next(candidate for candidate in _FIX_SENTENCES if candidate != kind)
         fixes, counterparts = self.fixes[talker, kind], self.fixes[talker, other_kind]
@@ -298,11 +299,11 @@ class _Sentences:
         )
 
     def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
-        """Dates that a talker states, each with its line; the dates of all talkers if it does not state a date."""
+        """Dates that a talker states, each with its line; if it states no date, the dates of all talkers."""
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """GST sentences of a talker, or else the GST sentences of all talkers without fixes.
+        """GST sentences of a talker; if there are no such sentences, the GST sentences of all talkers without fixes.
 
         A talker without fixes is another name of the same receiver.
         """
@@ -310,15 +311,15 @@ class _Sentences:
         return self.accuracies.get(talker) or sorted(gst for speaker in speakers for gst in self.accuracies[speaker])
 
     def unusable_words(self, talker: str) -> str:
-        """Note with the number of invalid values in GST sentences; empty if all values are valid.
+        """Phrase with the number of invalid values in GST sentences; empty if all values are valid.
 
-        The sentences of the talker are counted, and also the sentences of talkers without fixes.
+        Sentences of `talker` and of talkers without fixes are counted.
         """
         count = sum(self.unusable[speaker] for speaker in self.unusable.keys() - self.other_receivers(talker))
         return f", {counted(count, 'figure')} of accuracy that cannot be used left out" if count else ""
 
     def lost_words(self) -> str:
-        """Note with the number of sentences with a wrong checksum or an invalid date; empty if all are valid."""
+        """Phrase with the number of sentences with a wrong checksum or an invalid date; empty if all are valid."""
         lost, undated = self.lost.total(), len(self.undated)
         words = f", {counted(lost, 'sentence')} with a wrong checksum left out" if lost else ""
         return words + (f", {counted(undated, 'sentence')} without a date that there is left out" if undated else "")
@@ -388,7 +389,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
 
 
 def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys) -> Log:
-    """Make a log from the fixes of a talker in sentences of one kind, GGA or GNS."""
+    """Make a log from the fixes of a talker in sentences of the given kind, GGA or GNS."""
     fixes, dates = sentences.fixes[talker, kind], sentences.dates_for(talker)
     records = LogRecords(
         name,
@@ -426,10 +427,11 @@ def _log(talker: str, kind: str, sentences: _Sentences, name: str, keys: LogKeys
 def _sigmas(
     times: Floats, stated: Sequence[_Accuracy], dates: Sequence[tuple[int, Instant]], middle: float
 ) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of fixes at ascending times, from GST sentences. [m]
+    """1-sigma errors (n, 3) east, north, up of fixes, taken from GST sentences. [m]
 
-    Each error of a fix is the larger of the errors in the GST sentences before and after the fix. Sentences more than
-    5 s from the fix are ignored. An error is NaN if no sentence states it. Returns None if no fix has an error.
+    `times` [s] are the ascending times of the fixes. Each error of a fix is the larger of the errors in the GST
+    sentences before and after the fix. Sentences more than 5 s from the fix are ignored. An error is NaN if no
+    sentence states it. Returns None if no fix has an error.
     """
     if not stated:
         return None
@@ -451,8 +453,9 @@ def _dated(
 ) -> tuple[Floats, Floats]:
     """Modified Julian days of fixes, and their seconds of the day.
 
-    A fix is assumed to be within half a day of the last date before it, or of the first date if no date precedes it.
-    Without any dates, days are counted from the day of `middle`, the second of the day in the middle of the log.
+    A fix is assumed to be within half a day of the last date that precedes it, or of the first date if no date
+    precedes it. If there are no dates, days are counted from the day of the fix in the middle of the log. `middle` is
+    the second of the day of this fix.
     """
     seconds = np.array([fix.seconds for fix in fixes])
     if not dates:
@@ -466,7 +469,7 @@ def _dated(
 def _checked_fields(sentence: str) -> list[str]:
     """Split a sentence into its fields; raises `ValueError` if the checksum is missing or wrong.
 
-    The result is the same as from pynmea2, but takes a tenth of the time.
+    The result is the same as from pynmea2, which takes ten times as long.
     """
     match = _CHECKED.fullmatch(sentence)
     if match is None or reduce(xor, match[1].encode()) != int(match[2], 16):
@@ -475,7 +478,7 @@ def _checked_fields(sentence: str) -> list[str]:
 
 
 def _unchecked_fields(sentence: str) -> list[str]:
-    """Split a sentence into its fields without verifying the checksum; 14 empty fields are appended."""
+    """Split a sentence into its fields without verifying the checksum, and append 14 empty fields."""
     return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
@@ -508,7 +511,7 @@ def _metres(text: str, unit: str, where: str) -> float:
 def _fix(
     fields: Sequence[str], where: str, line: int, quality: _Quality | None, height: Sequence[str]
 ) -> _Fix | None:
-    """Make a fix from the fields of a sentence; None if `quality` is None, which means that it has no position.
+    """Make a fix from the fields of a sentence; None if `quality` is None, because there is then no position.
 
     `height` has four fields: height, unit of the height, geoid separation, and unit of the separation.
     """
@@ -590,7 +593,7 @@ def _dated_at(date: str, clock: str, text: str, where: str) -> Instant:
 
 @lru_cache(maxsize=64)
 def _day(date: str) -> int | None:
-    """Modified Julian day of a date like 2026-06-01; None if the date does not exist."""
+    """Modified Julian day of a date such as 2026-06-01; None if there is no such date."""
     midnight = parse_instant(f"{date}T00:00:00Z")
     return None if midnight is None else midnight.day
 

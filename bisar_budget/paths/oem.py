@@ -1,4 +1,4 @@
-"""Orbit ephemeris messages (OEM) of CCSDS 502.0-B, as text of keywords and values or as XML."""
+"""Reader of orbit ephemeris messages (OEM) of CCSDS 502.0-B, written as text with keywords or as XML."""
 
 import math
 import re
@@ -58,7 +58,7 @@ _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 class CovarianceBlock:
     """A covariance as written in a message: line, epoch, frame, and the rows of its lower triangle.
 
-    If `frame` is empty, the reference frame is the same as for positions and velocities.
+    If `frame` is empty, the covariance is in the reference frame of the positions and velocities.
     """
 
     line: int
@@ -76,9 +76,9 @@ class _EphemerisBlock:
     line : int
         Number of the first line.
     metadata : mapping
-        Line number and value of each keyword in the metadata.
+        Line number and value for each keyword in the metadata.
     rows : sequence
-        Line number of each sample, with its epoch and its numbers as strings.
+        Line number, epoch, and numbers (as strings) of each sample.
     covariances : sequence of CovarianceBlock
         Covariances of the segment.
     """
@@ -94,11 +94,11 @@ def read_oem(
 ) -> Orbit:
     """Read an orbit ephemeris message, and return the orbit of an object.
 
-    Arguments and errors are the same for all readers, see `OrbitFormat.read`.
+    The arguments and errors are the same for all readers; see `OrbitFormat.read`.
 
-    If the message states no interpolation, Hermite's polynomial of degree 7 is used, or Lagrange's polynomial of
-    degree 7 if the velocities do not agree with the positions. A polynomial of degree n goes through n + 1 samples if
-    it is Lagrange's, and through (n + 1)/2 samples if it is Hermite's.
+    If the orbit message (OEM) states no interpolation, Hermite's polynomial of degree 7 is used, or Lagrange's
+    polynomial of degree 7 if the velocities do not agree with the positions. A Lagrange polynomial of degree n goes
+    through n + 1 samples, and a Hermite polynomial of degree n through (n + 1)/2 samples.
 
     `object_name` is an OBJECT_NAME or an OBJECT_ID.
     """
@@ -204,8 +204,8 @@ def read_covariance(
 ) -> EpochCovariance:
     """Convert a covariance of a CCSDS message from strings in km and km/s to numbers in m and m/s.
 
-    `time` is the epoch of the covariance in TAI. `frame` is the reference frame of the message, which is used if the
-    covariance does not state a frame.
+    `time` is the epoch of the covariance in TAI. `frame` is the reference frame of the orbit message (OEM), and
+    applies if the covariance does not state a frame of its own.
     """
     location = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
@@ -237,7 +237,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Note for reports on a message without a stated interpolation or degree; empty if it states both."""
+    """Text that a message states no interpolation or no degree, for reports; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"
@@ -289,7 +289,7 @@ def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str
 
 
 def _time(line: int, text: str, system: str, name: str) -> Instant:
-    """Convert a time, given as a string in the time system `system`, to an instant of TAI."""
+    """Convert a time from a string in the time system `system` to an instant in TAI."""
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # A leap second is part of the last minute of its day.
@@ -362,8 +362,8 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
 def _add_to_covariances(covariances: list[CovarianceBlock], number: int, line: str, name: str) -> None:
     """Read a line between COVARIANCE_START and COVARIANCE_STOP, and add it to the covariances.
 
-    The line contains an epoch, which begins a new covariance, or a frame or a row of the triangle of the last
-    covariance.
+    A line with an epoch begins a new covariance. Any other line contains the frame of the last covariance, or a row
+    of its lower triangle.
     """
     key, equals, value = (piece.strip() for piece in line.partition("="))
     if key == "EPOCH" and equals:
@@ -395,12 +395,15 @@ def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
 
 
 def _matrix(matrix: MessageElement) -> CovarianceBlock:
-    """Covariance from an XML element whose children are the lower triangle: CX_X, CY_X, CY_Y, …"""
+    """Read a covariance from an XML element whose children are the lower triangle: CX_X, CY_X, CY_Y, …"""
     return named_covariance({element.name: element.text.strip() for element in matrix.children}, matrix.line)
 
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
-    """Covariance from strings by keyword, such as CX_X, CY_X, CY_Y, …; empty strings count as missing."""
+    """Make a covariance from the strings in a message, given by keyword: CX_X, CY_X, CY_Y, …
+
+    Empty strings are treated as missing.
+    """
     rows: list[tuple[int, Sequence[str]]] = [
         (line, [leaves[key] for key in keywords if leaves.get(key)]) for keywords in _TRIANGLE_KEYWORDS
     ]

@@ -1,9 +1,10 @@
 """Orientation of the Earth in inertial space: sidereal time, precession and nutation, UT1 and polar motion.
 
 UT1 - UTC and polar motion come from tables that the IERS issues every week. UT1 - UTC is kept below 0.9 s. An error
-of 1 ms turns the Earth by 0.51 m at the distance of a low orbit. Polar motion is up to 0.6", which is 20 m there. If
-a mission states neither, orbits are converted with UT1 = UTC and without polar motion. The resulting error of the
-orientation is constant throughout an aperture: it shifts the path, and does not bend it.
+of 1 ms in UT1 - UTC displaces a low orbit by 0.51 m. Polar motion is up to 0.6", which displaces a low orbit by 20 m.
+If a mission states neither UT1 - UTC nor polar motion, orbits are converted with UT1 = UTC and without polar motion.
+The resulting error of the orientation is constant throughout an aperture. It therefore shifts the path, but does not
+bend it.
 """
 
 import math
@@ -44,9 +45,10 @@ class Orientation(NamedTuple):
         of `ut1_doubt`, 0.1 s, is an example value for the warning in reports. The default of `pole_doubt` is the
         largest displacement of the pole.
     day : int, optional
-        Day of UTC to which UT1 - UTC belongs, so that UT1 has no jump at a leap second. None means any day.
+        UTC day for which UT1 - UTC is given. It is needed so that UT1 has no jump at a leap second. If it is None,
+        UT1 - UTC is used on any day.
     is_predicted : bool
-        Whether the values are predictions, for reports.
+        Whether the values are predictions; this is stated in reports.
     """
 
     ut1_minus_utc: float = 0.0
@@ -64,12 +66,12 @@ class Orientation(NamedTuple):
         return f", UT1 - UTC {self.ut1_minus_utc:.6g} s" + (" (predicted)" if self.is_predicted else "")
 
     def ut1(self, instant: Instant) -> Instant:
-        """Convert an instant of UTC to UT1."""
+        """Convert an instant in UTC to UT1."""
         leaps = 0 if self.day is None else tai_less_utc(instant.day) - tai_less_utc(self.day)
         return instant.after(self.ut1_minus_utc + leaps)
 
     def misplaced(self, position: Vector) -> tuple[float, float]:
-        """Largest position errors due to `ut1_doubt` and due to `pole_doubt`. [m]"""
+        """Largest errors of a position due to the uncertainties `ut1_doubt` and `pole_doubt`, in this order. [m]"""
         turned = ROTATION_RATE_RAD_PER_S * self.ut1_doubt * math.hypot(position[0], position[1])
         return turned, self.pole_doubt * math.hypot(*position)
 
@@ -86,9 +88,10 @@ def from_teme(position: Vector, instant: Instant, orientation: Orientation = UNK
 
 
 def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
-    """Convert a position to Earth-fixed axes from axes that rotate with the Earth and have z along the rotation axis.
+    """Apply polar motion: convert a position from axes with z along the Earth's rotation axis to Earth-fixed axes.
 
-    The rotation is R₁(-y)·R₂(-x) for the coordinates x, y of the pole [rad] (IERS Conventions, 5.1).
+    Both systems of axes rotate with the Earth. The conversion is R₁(-y)·R₂(-x) for the coordinates x, y of the pole
+    [rad] (IERS Conventions, 5.1).
     """
     (sine_x, cosine_x), (sine_y, cosine_y) = ((math.sin(angle), math.cos(angle)) for angle in pole)
     x, y, z = position
@@ -99,9 +102,9 @@ def _from_true_pole(position: Vector, pole: tuple[float, float]) -> Vector:
 def sidereal_time(ut1: Instant) -> float:
     """Greenwich mean sidereal time as defined by the IAU in 1982. [rad]
 
-    Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (also Aoki and others,
-    1982). The term of 876600 hours per century in the equation is one revolution per day. It is computed from the
-    seconds of the day, because direct evaluation of the equation would have a rounding error of 1e-7 s.
+    Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (see also Aoki et al.,
+    1982). The equation contains a term of 876600 hours per century, which is one revolution per day. This term is
+    computed from the seconds of the day, because the rounding error of a direct evaluation would be 1e-7 s.
     """
     centuries = (ut1.day - _J2000_DAY - 0.5 + ut1.seconds / DAY_S) / _CENTURY_DAYS
     at_midnight = (ut1.day - _J2000_DAY - 0.5) / _CENTURY_DAYS
@@ -119,8 +122,8 @@ def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
     The celestial axes are the axes of the GCRF, or the mean equator and equinox of J2000 if `is_j2000` is set.
 
     Precession follows the IAU 2006 model, and nutation the IAU 2000A model (IERS Conventions 2010, chapter 5). The
-    axes of J2000 differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. Positions
-    are wrong by this amount if a file calls the GCRF `EME2000`.
+    axes of J2000 differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. If a file
+    labels positions in the GCRF as `EME2000`, the converted positions are wrong by this amount.
 
     Raises
     ------
@@ -164,10 +167,10 @@ _ACCEPTED_TABLES = "accepted: finals2000A.all or .csv of the IERS, its C04, or E
 
 
 class _TableRow(NamedTuple):
-    """A row of a table, with the values for one day.
+    """A row of an Earth rotation table: the values for one day.
 
-    `cells` are the strings of the MJD, x of the pole, y of the pole and UT1 - UTC. Each of the last three is followed
-    by the string of its error, which may be empty.
+    `cells` are strings: the MJD, then x of the pole, y of the pole and UT1 - UTC, each followed by its error. The
+    string of an error may be empty.
     """
 
     line: int
@@ -179,11 +182,11 @@ class _TableRow(NamedTuple):
 def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation:
     """Orientation of the Earth at an instant, from a table of the IERS or of CelesTrak.
 
-    The table may be finals2000A, or finals of the IAU 1980, each as the daily or the complete file in fixed columns.
-    It may also be finals2000A.all.csv, C04 of any series, or EOP-All.csv of CelesTrak. Between two days the
-    orientation is interpolated linearly. Tidal variations with periods below one day, of 0.03 ms and 0.5 mas, are not
-    in the table. `ut1_doubt` and `pole_doubt` are the errors stated in the rows. For predictions they grow to a few
-    ms within a month.
+    Supported tables are finals2000A and the finals for IAU 1980 in fixed columns (daily or complete file),
+    finals2000A.all.csv, C04 of any series, and EOP-All.csv of CelesTrak. The orientation is interpolated linearly
+    between two days. Such tables do not contain the tidal variations with periods below one day, which amount to 0.03
+    ms and 0.5 mas. The errors stated in the rows become the `ut1_doubt` and `pole_doubt` of the result. For
+    predictions, the error of UT1 grows to a few ms within a month.
 
     Parameters
     ----------
@@ -197,7 +200,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
     Raises
     ------
     PathFileError
-        The file is not such a table, or has no values for the day of the instant or for the next day.
+        The file is not a supported table, or has no values for the day of the instant or for the next day.
 
     Notes
     -----
@@ -233,7 +236,10 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
 
 
 def _rows(text: str, name: str) -> Iterator[_TableRow]:
-    """Yield the rows of a table that have values; the format of the table is recognised from its first lines."""
+    """Yield the rows of an Earth rotation table, except rows without values.
+
+    The format of the table is recognised from its first lines.
+    """
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     header = lines[0][1].strip() if lines else ""
     if header.lower().startswith(("<!doctype", "<html", "<?xml")):
@@ -258,7 +264,7 @@ _MAX_HEADER_LINES = 40  # lines of text above the rows of C04
 
 
 def _unreadable_table(text: str) -> str | None:
-    """Name of a kind of Earth rotation table that is recognised but not supported, for a message.
+    """Name the format of an Earth rotation table that is recognised but not supported, for a message.
 
     Returns None for any other text.
     """
@@ -285,7 +291,7 @@ def _of_finals(lines: Sequence[tuple[int, str]]) -> Iterator[_TableRow]:
 
 
 def _is_empty(cells: Sequence[str]) -> bool:
-    """Whether a row has a date but no values, like the rows for days too far in the future."""
+    """Whether a row has a date but no values, as is usual for days too far in the future."""
     return bool(cells[0]) and not any(cells[1:])
 
 
@@ -345,7 +351,7 @@ def _column_of(header: Sequence[str], keys: Sequence[str], name: str) -> int:
 
 
 def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> list[str]:
-    """Split a line into cells. A truncated line, with fewer cells than the header, is refused."""
+    """Split a line of a table into cells; refuse a truncated line (with fewer cells than the header)."""
     cells = [cell.strip() for cell in line.split(separator)]
     if len(cells) < len(header):
         raise PathFileError(f"{location}: has {len(cells)} values, the header {len(header)}")
@@ -353,7 +359,7 @@ def _row_of(line: str, separator: str, header: Sequence[str], location: str) -> 
 
 
 def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list[float]:
-    """Numbers of a row: MJD, then x and y of the pole [arcsec] and UT1 - UTC [s], each followed by its error.
+    """Convert a row to numbers: MJD, then x and y of the pole [arcsec] and UT1 - UTC [s], each followed by its error.
 
     If the row states no errors, typical errors are used. For predictions these grow with the time since
     `last_measured`, the last day with measured values. Raises `PathFileError` for a cell that is not a number, and
@@ -390,7 +396,7 @@ def _numbers(row: _TableRow, last_measured: float | None, location: str) -> list
 
 
 def _between(first: list[float], second: list[float], fraction: float) -> Orientation:
-    """Orientation interpolated linearly between the rows of two successive days.
+    """Interpolate the orientation of the Earth linearly between the rows of two successive days.
 
     `first` and `second` are rows as returned by `_numbers`. `fraction` is the elapsed fraction of the first day.
     """

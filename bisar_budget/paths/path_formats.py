@@ -1,4 +1,4 @@
-"""Formats of orbit files and flight logs: name in messages, content that identifies the format, and reader."""
+"""Formats of orbit files and flight logs: for each, its name, its reader, and the content that identifies it."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -103,7 +103,7 @@ def orbit_format(data: bytes) -> str | None:
 def hold_to_format(data: bytes, name: str, form: str) -> None:
     """Refuse a file that is in a known format other than the orbit format `form`.
 
-    The message names the key of the mission file for the actual format, if there is such a key.
+    If the mission file has a key for files in the actual format, the error message names this key.
     """
     actual = orbit_format(data)
     if actual == form:
@@ -116,20 +116,20 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 
 def hold_to_log(data: bytes, name: str) -> None:
-    """Refuse a file that is not a flight log, but an orbit, or a file in a known format that cannot be read.
+    """Refuse a file that contains an orbit instead of a flight log, or has a known but unsupported format.
 
-    The message names the key of the mission file for the actual format, if there is such a key.
+    If the mission file has a key for files in the actual format, the error message names this key.
     """
     _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
 
 
 def _words_of_logs() -> str:
-    """Description of all log formats, each with its name in the mission file."""
+    """List all log formats for a message, each with its description and its name in the mission file."""
     return ", ".join(f"{format.words} ({key})" for key, format in LOG_FORMATS.items())
 
 
 def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
-    """Refuse a file that is an orbit in the format `actual`, or that has a known format that cannot be read.
+    """Refuse a file that is an orbit in the format `actual`, or that has a known but unsupported format.
 
     `actual` is a key of `ORBIT_FORMATS`, or None if the file is not an orbit. `accepted` describes what is accepted.
     """
@@ -155,7 +155,10 @@ def _has_ubx(data: bytes) -> bool:
 
 
 def _ubx_sums(data: bytes) -> bytes:
-    """Fletcher checksum (two bytes) of a u-blox message without sync bytes and checksum."""
+    """Fletcher checksum (two bytes) of a u-blox message.
+
+    The sync bytes and the checksum of the UBX message are not part of `data`.
+    """
     first = second = 0
     for byte in data:
         first = (first + byte) & 0xFF

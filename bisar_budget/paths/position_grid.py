@@ -1,9 +1,10 @@
-"""Rounding of the fixes in a log to a grid, which limits how well a position is known for any receiver.
+"""Rounding of the fixes in a log to a grid, which limits the accuracy of the positions even for a perfect receiver.
 
-A log writes degrees, minutes and metres with a fixed number of decimals. The grid is the coarsest decimal step on
-which all fixes lie. It is found from the numbers alone; trailing zeros in a cell are not used as evidence. A step
-counts as a grid only if the fixes deviate from a smooth path by about the rounding error of the step. This is needed
-because fixes of a simulated platform that is at rest, or has a round speed, lie on a coarse grid by chance.
+A log writes degrees, minutes and metres with a fixed number of decimals. The step of the grid is the coarsest decimal
+step such that all values differ by multiples of it. It is found from the values alone; trailing zeros in a cell are
+not used as evidence. A step counts as a grid only if the fixes deviate from a smooth path by about the rounding error
+of the step. This condition is needed because the fixes of a simulated platform may lie on a coarse grid by chance, if
+the platform is at rest or its speed is a round number.
 """
 
 import math
@@ -36,7 +37,7 @@ def decimal_step(times: Floats, values: Floats, units: Sequence[float]) -> float
     values : (n,) ndarray
         Values of the coordinate. [SI]
     units : sequence of float
-        Sizes of the units in which the coordinate may be written in the log. [SI] A decimal step is a unit times a
+        Units in which the log may contain the coordinate, each as its size in SI. A decimal step is a unit times a
         power of ten.
     """
     stride = -(-len(values) // _MAX_FIXES)
@@ -69,9 +70,9 @@ def _roughness(times: Floats, values: Floats) -> float:
 
 
 def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Floats) -> Matrix:
-    """Vectors of one grid step in latitude, longitude and height, in Earth-fixed axes. [m]
+    """Displacements by one grid step in latitude, longitude and height, in Earth-fixed axes, (3, 3). [m]
 
-    Each row of the result (3, 3) is a vector. It is zero for a coordinate without a grid.
+    The result has a row for each coordinate. The row of a coordinate without a grid is zero.
     """
     middle = len(times) // 2
     middle_fix = np.array([latitude[middle], longitude[middle], height[middle]])
@@ -88,9 +89,9 @@ def geodetic_grid(times: Floats, latitude: Floats, longitude: Floats, height: Fl
 
 
 def cartesian_grid(times: Floats, positions: Floats) -> Matrix:
-    """Vectors of one grid step along each axis of positions (n, 3). [m]
+    """Displacements by one grid step along each axis of positions (n, 3), as vectors (3, 3). [m]
 
-    Each row of the result (3, 3) is a vector. It is zero for an axis without a grid.
+    The result has a row for each axis. The row of an axis without a grid is zero.
     """
     steps = [decimal_step(times, values, _LENGTH_UNITS_M) for values in positions.T]
     return tuple(tuple(row) for row in np.diag(steps).tolist())

@@ -1,14 +1,14 @@
-"""Solutions of RTKLIB (`.pos`): a header line that names time scale and columns, then one fix per line.
+"""Solutions of RTKLIB (`.pos`): a header line that names the time scale and the columns, then one fix per line.
 
     % (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)
     %  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m) ...
     2026/06/01 05:20:19.250   48.086600000   11.279700000  3000.0000   1  12   0.0100   0.0080   0.0200 ...
 
-The header line begins with %. Each fix is followed by its errors. Times are in GPST, UTC or JST (UTC + 9 h), as a
-date and time, or as a GPS week and seconds of the week in that scale. A fix has latitude, longitude and height, or
-Earth-fixed x, y, z. Latitude and longitude are in degrees, or in degrees, minutes and seconds. Heights are
-`ellipsoidal`, or `geodetic`, which means above the geoid in RTKLIB. Cells are separated by blanks, or by the
-character after the name of the first column.
+The header line begins with %. Each fix is followed by its errors. Times are in GPST, UTC or JST (UTC + 9 h). Each
+time is written as a date and a time of day, or as a GPS week and the seconds of that week. A fix has latitude,
+longitude and height, or Earth-fixed x, y, z. Latitude and longitude are in degrees, or in degrees, minutes and
+seconds. Heights are `ellipsoidal`, or `geodetic`, which means above the geoid in RTKLIB. Cells are separated by
+blanks, or by the character that follows the name of the first column in the header line.
 
 Source: RTKLIB 2.4.3, src/solution.c, functions outsolheads, outsols, outpos and outecef, which write such files.
 """
@@ -167,9 +167,10 @@ def _header(text: str, location: str) -> _Columns | None:
 
 
 def _row(text: str, header: _Columns, location: str) -> tuple[int, list[float]]:
-    """Read a line with a fix; return its modified Julian day and its numbers.
+    """Read a line with a fix; return the modified Julian day of the fix and a list of numbers.
 
-    There is a number for each cell, which is 0 for the two cells of the time. The seconds of the day are appended.
+    The list has a number for each cell of the line, and the seconds of the day at its end. The first two cells
+    contain the time; their numbers are set to 0.
     """
     cells = (text.replace(header.delimiter, " ") if header.delimiter else text).split()
     if len(cells) != header.width:
@@ -256,9 +257,9 @@ def _heights(heights: Floats, datum_line: str, keys: LogKeys, name: str) -> Floa
 
 
 def _qualities(table: Floats, header: _Columns) -> str:
-    """Text with the four most frequent qualities, and the number of fixes with each quality.
+    """Describe the qualities of the fixes: the four most frequent qualities, with the number of fixes of each.
 
-    The text is empty if the solution has no quality column.
+    The result is empty if the solution has no quality column.
     """
     if "Q" not in header.indices:
         return ""

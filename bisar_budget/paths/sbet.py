@@ -65,7 +65,7 @@ _ACCEPTED_ACCURACY_FILE = "accepted: an accuracy file (smrmsg), records of ten d
 
 
 class _Kind(NamedTuple):
-    """A kind of file that consists of records: an SBET, or its accuracy file.
+    """A kind of file that consists of records of doubles: an SBET, or the accuracy file of an SBET.
 
     Attributes
     ----------
@@ -74,9 +74,10 @@ class _Kind(NamedTuple):
     width : int
         Number of doubles in a record.
     fields : tuple
-        Fields that are checked: name, index in a record, smallest and largest value, and unit of each.
+        Fields of a record that are checked. Each entry has the name of a field, its index in the record, its smallest
+        and largest value, and its unit.
     nonzero_fields : int
-        Number of doubles at the beginning of a record, which must not all be zero in a usable record.
+        Number of fields at the beginning of a record, of which at least one is not zero in a usable record.
     """
 
     words: str
@@ -98,7 +99,7 @@ _SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SMRMSG_FIELDS, 4)
 class Accuracy:
     """One-sigma errors of position [m] and velocity [m/s], east, north and up.
 
-    Each error is the maximum over a number of `records`.
+    Each error is the maximum over several records. The number of these records is `records`.
     """
 
     position: Vector
@@ -130,7 +131,8 @@ def is_accuracy(data: bytes) -> bool:
 def _looks_like(data: bytes, kind: _Kind) -> bool:
     """Whether a file appears to consist of records of the given kind.
 
-    Most of the first three and last three records must be usable, and the first and last of their times must differ.
+    Most of the first three and the last three records must be usable. The first and the last usable record among
+    these six must have different times.
     """
     count = len(data) // kind.size
     if not count or (b"\n" in data[: kind.size] and data[: kind.size].isascii()):
@@ -175,12 +177,13 @@ def read_accuracy(
     center_seconds: float | None,
     aperture_time_s: float,
 ) -> Accuracy:
-    """Read the accuracy of a trajectory in the aperture from a file of at most `MAX_SBET_BYTES` bytes.
+    """Read the accuracy of a trajectory during the aperture from its accuracy file.
 
-    For each sigma, the largest value in or directly next to the aperture is used, see `around_aperture`. `week` is
-    the GPS week of the trajectory. All further arguments are the same as in `slow_times`. Raises `PathFileError`,
-    with the record or byte of the fault, for a damaged file, and for records that do not cover the aperture, have a
-    gap in the aperture, or state an error of zero throughout.
+    Each component of the result is the largest sigma of the records in the aperture and directly next to it (see
+    `around_aperture`). `week` is the GPS week of the trajectory. All further arguments are the same as in
+    `slow_times`. Raises `PathFileError`, with the record or byte of the fault, for a damaged file, and for records
+    that do not cover the aperture, have a gap in the aperture, or state an error of zero throughout the aperture. The
+    file may have at most `MAX_SBET_BYTES` bytes.
     """
     if is_sbet(data) and not is_accuracy(data):
         raise PathFileError(f"{name}: is an SBET, a trajectory", _ACCEPTED_ACCURACY_FILE, "trajectory.file reads it")
@@ -203,9 +206,10 @@ def read_accuracy(
 
 
 def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
-    """Read the records (n, width) of a file. In a usable record, every checked field is within its range.
+    """Read the records (n, width) of a file, and determine which of them are usable.
 
-    An incomplete record at the end, where writing stopped, counts as an unusable record.
+    In a usable record, every checked field is within its range. If the file ends within a record, this record counts
+    as unusable.
     """
     hold_to_bytes(data, MAX_SBET_BYTES, name)
     if not data:
@@ -227,7 +231,7 @@ def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
 
 
 def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: int) -> str:
-    """Text with the name and value of the first out-of-range field in a record, for a message."""
+    """Name and value of the first out-of-range field in a record, as text for a message."""
     field, column, _, _, unit = kind.fields[int(wrong[:, index].argmax())]
     return f"{field} is {table[index, column]:.6g} {unit}"
 
@@ -235,7 +239,7 @@ def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: in
 def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[np.bool_]) -> PathFileError:
     """Make the error for a file with too many impossible records.
 
-    The message names the likely cause, such as a different kind of file or different units.
+    The error message names the likely cause, such as a different kind of file or different units.
     """
     index = int(wrong.any(axis=0).argmax())
     field, column, *_ = kind.fields[int(wrong[:, index].argmax())]
@@ -263,9 +267,9 @@ def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
 
 
 def _over_weeks(times: Floats, records: LogRecords) -> Floats:
-    """Convert seconds of the GPS week (n,) to times that continue to increase past the end of a week. [s]
+    """Convert seconds of the GPS week (n,) to times that do not restart at the end of a week. [s]
 
-    Times of unusable records are unchanged.
+    The times of unusable records are not changed.
     """
     usable = np.flatnonzero(records.is_usable)
     usable_times = times[usable]

@@ -42,18 +42,18 @@ _MAX_SAMPLE_GAP_RATIO = 1.5  # of a gap to the usual step; no polynomial crosses
 
 @dataclass
 class _Satellite:
-    """Samples of a satellite in a file.
+    """A satellite in an SP3 file, with the samples of its orbit.
 
     Attributes
     ----------
     id : str
         Name of the satellite.
     accuracy : float
-        Accuracy in the header; 0 if it is unknown. [m]
+        Accuracy of the orbit, from the header; 0 if it is unknown. [m]
     samples : list of Sample
         Times in TAI, positions and velocities.
     lines : list of int
-        Numbers of the lines of the samples.
+        Line of the file in which each sample is written.
     deviations : list of Vector or None
         Standard deviations of the position of each sample; None if the file states none. [m]
     breaks : set of int
@@ -78,11 +78,12 @@ def read_sp3(
 
     Arguments and errors are the same for all readers, see `OrbitFormat.read`.
 
-    No interpolation crosses missing positions of the satellite, or a manoeuvre that the file flags. Positions with
-    sound velocities are interpolated by Hermite's polynomial of degree 7. Positions alone are interpolated by
-    Lagrange's polynomial, of the degree from 7 to 15 with the smallest estimated error around the aperture. The
-    orientation is not needed, since the axes are fixed to the Earth. Lines that cannot be used are left out and
-    counted, up to 1 % of the satellite's positions. No interpolation crosses a position that is left out.
+    The orbit is not interpolated across missing positions of the satellite, or across a manoeuvre that is flagged in
+    the file. If the file has velocities that agree with the positions, Hermite's polynomial of degree 7 is used.
+    Otherwise Lagrange's polynomial is used, with the degree from 7 to 15 that has the smallest estimated error around
+    the aperture. The orientation is not needed, since the axes are fixed to the Earth. Unusable lines are left out
+    and counted, up to 1 % of the satellite's positions. The orbit is not interpolated across a position that is left
+    out.
     """
     hold_to_size(len(data), name, "time")
     lines = decoded(data, name).split("\n")
@@ -102,24 +103,24 @@ def read_sp3(
 
 
 def _first_of(broken: Mapping[int, str]) -> str:
-    """Message about unusable lines: the fault in the first one, and the number of such lines if there are several."""
+    """Error message for unusable lines: the fault in the first line, and the number of lines if there are several."""
     problem = broken[min(broken)]
     return problem if len(broken) == 1 else f"{problem}; {len(broken)} lines cannot be used"
 
 
 class _Heading:
-    """Header of a file, and counts of unusable lines.
+    """Header of an SP3 file, and the unusable lines of the file.
 
     Attributes
     ----------
     frame, system : str
-        Earth-fixed axes and time system.
+        Names of the Earth-fixed axes and of the time system.
     base : float
         Standard deviations of positions are written as exponents of this base; 0 if the file states no base.
     nameless : int
-        Number of positions without a readable name of a satellite.
+        Number of positions for which the name of the satellite cannot be read.
     broken : dict
-        Messages about other unusable lines, by their numbers.
+        Messages about other unusable lines, by line number.
     first_epoch_line : int
         Number of the line with the first epoch.
     accuracy : dict
@@ -179,7 +180,7 @@ def _accuracy(exponent: str) -> float:
 
 
 def _deviations(line: str, base: float) -> Vector | None:
-    """Standard deviations of the position in a line, for each axis baseⁿ mm; None if the line states none. [m]
+    """Standard deviations of the position in a line, baseⁿ mm for each axis; None if they are not stated. [m]
 
     The line states the exponents n. An axis without an exponent gets the largest exponent of the line. If all
     exponents are zero, the line states no standard deviation.
@@ -196,14 +197,17 @@ def _deviations(line: str, base: float) -> Vector | None:
 
 
 def _id(text: str) -> str:
-    """Standard name of a satellite, such as G05, from `G05`, `G 5`, or `5` as written in SP3-a."""
+    """Standard name of a satellite, such as G05, from its name in a file: `G05`, `G 5`, or `5` in SP3-a."""
     return (text[:1].strip() or "G") + text[1:].strip().rjust(2, "0")
 
 
 def _satellites(
     lines: Sequence[str], header: _Heading, name: str, object_name: str | None = None
 ) -> dict[str, _Satellite]:
-    """Read the samples of all satellites of a file, or of a named satellite; return the satellites by name."""
+    """Read the samples of all satellites in a file, or only of the satellite `object_name`.
+
+    Returns the satellites by name.
+    """
     key = None if object_name is None else object_key(object_name)
     satellites: dict[str, _Satellite] = {}
     time: Instant | None = None
@@ -251,7 +255,10 @@ def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: s
 
 
 def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -> None:
-    """Read a velocity from a line, and add it to the sample `index`, whose position is in the line before."""
+    """Read a velocity from a line, and add it to the sample with index `index`.
+
+    The position of that sample is in the preceding line.
+    """
     if _satellite_of(line, location) != satellite.id:
         raise PathFileError(f"{location}: the velocity is not of {satellite.id}, whose position is above it")
     velocity = [speed / 10 for speed in _numbers(line, location, "dm/s")]
@@ -262,9 +269,9 @@ def _add_velocity(line: str, satellite: _Satellite, index: int, location: str) -
 def _add_position(
     line: str, time: Instant, number: int, satellites: dict[str, _Satellite], header: _Heading, name: str
 ) -> tuple[_Satellite, int] | None:
-    """Read a position from a line, and add it to the samples of its satellite; return satellite and sample index.
+    """Read a position from a line, and add it to the samples of its satellite; return the satellite and the index.
 
-    Returns None if the line has no position, or repeats the sample before it.
+    The index identifies the new sample. Returns None if the line has no position, or repeats the previous sample.
     """
     location = f"{name}:{number}"
     satellite_id = _satellite_of(line, location)
@@ -298,7 +305,7 @@ def _add_position(
 def _is_of(line: str, key: str) -> bool:
     """Whether a line with a position or a velocity belongs to a satellite.
 
-    `key` is the name of the satellite in the form of `object_key`. A line without a name belongs to no satellite.
+    `key` is the name of the satellite, normalised by `object_key`. A line without a name belongs to no satellite.
     """
     return bool(_SATELLITE.fullmatch(line[1:4])) and object_key(_id(line[1:4])) == key
 
@@ -345,7 +352,7 @@ def _epoch(line: str, system: str, location: str) -> Instant:
 def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instant) -> Iterator[Segment]:
     """Yield the segments of a satellite's orbit between gaps and manoeuvres.
 
-    `center` is mid-aperture in TAI. It decides whether a warning about predicted positions is needed.
+    `center` is the middle of the aperture in TAI. If positions around it are predicted, the segments carry a warning.
     """
     samples = satellite.samples
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
@@ -392,10 +399,10 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
 
 
 def _stated(satellite: _Satellite, stretch: range, time: Instant) -> StatedAccuracy | None:
-    """Accuracy that a file states for a satellite at a time in TAI; None if it states none.
+    """Accuracy that the file states for the orbit of a satellite at a time in TAI; None if it states no accuracy.
 
-    It is the accuracy in the header, or the standard deviations of the samples directly before and after the time if
-    these are larger. `stretch` are the indices of the samples of a segment.
+    The accuracy in the header is used, or the standard deviations of the samples directly before and after the time,
+    if these are larger. `stretch` is the range of the indices of the samples in a segment.
     """
     after = bisect_left(satellite.samples, time, stretch.start, stretch.stop, key=lambda sample: sample.time)
     neighbours = {min(max(index, stretch.start), stretch.stop - 1) for index in (after - 1, after)}

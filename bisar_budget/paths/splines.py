@@ -1,15 +1,14 @@
-"""Splines through the fixes of a log: a long path as several polynomials, each over a piece of time.
+"""Splines through the fixes of a log: a long path as a sequence of polynomials, each valid for a piece of time.
 
 A spline of order 5 is continuous in position and in four derivatives; only the fifth derivative jumps between pieces.
-Pieces in which the residual still contains motion are halved. So a turn gets short pieces, and the straight legs
-before and after it get long pieces.
+A piece is halved if its residual still contains motion. A turn is therefore fitted with short pieces, and the
+straight legs before and after it with long pieces.
 
 Two rules separate motion from noise. First, an information criterion weighs the number of coefficients against the
-number of independent fixes, so that white noise is not fitted. Second, as the number of coefficients increases, the
-mean product of neighbouring residuals must fall at least with the inverse square of this number. Motion due to finite
-forces meets the second rule: even if the acceleration is white noise, the residual in pieces of length h has a
-variance proportional to h³. Slowly varying receiver noise (Gauss-Markov) does not meet it: its residual has a
-variance proportional to h.
+number of independent fixes, so that white noise is not fitted. Second, the mean product of neighbouring residuals
+must decrease at least with the inverse square of the number of coefficients. Motion due to finite forces meets the
+second rule: even if the acceleration is white noise, the residual in pieces of length h has a variance proportional
+to h³. Slowly varying receiver noise (Gauss-Markov) does not meet it: its residual has a variance proportional to h.
 """
 
 from collections.abc import Iterable
@@ -30,9 +29,10 @@ _HALVED_MOTION_FRACTION = 0.5  # pieces with more than this fraction of the larg
 
 
 def basis(times: Floats, edges: Floats) -> Floats:
-    """Values (n, m + `SPLINE_ORDER`) of all B-splines at times (n,), for m pieces with ascending edges (m + 1,).
+    """Values of all B-splines at given times, (n, m + `SPLINE_ORDER`).
 
-    The first and the last piece continue beyond the edges. Source: the recursion of de Boor (1972) and Cox (1972).
+    There are n times, and m pieces with ascending edges (m + 1,). The first and the last piece continue beyond the
+    edges. Source: the recursion of de Boor (1972) and Cox (1972).
     """
     pieces = len(edges) - 1
     knots = np.concatenate([np.full(SPLINE_ORDER, edges[0]), edges, np.full(SPLINE_ORDER, edges[-1])])
@@ -60,14 +60,15 @@ class SplineFit:
     edges : (m + 1,)
         Times at which pieces begin and end. [s]
     center : (3,)
-        Mean position of the fixes. [m] The spline is relative to it, so that no digits are lost if the fixes are far
-        from the origin.
+        Mean position of the fixes [m]. The spline is relative to this position, so that no digits are lost if the
+        fixes are far from the origin.
     series : (coefficients, 3)
         Coefficients of the spline. [m]
     residuals : (n, 3)
         Positions of the fixes minus the spline. [m]
     root : (coefficients, coefficients)
-        Matrix whose product with its transpose is the covariance of the coefficients for white fixes of variance 1.
+        Matrix whose product with its transpose is the covariance of the coefficients if the fixes have white noise of
+        variance 1.
     """
 
     edges: Floats
@@ -90,17 +91,16 @@ class SplineFit:
 
     @cached_property
     def motion(self) -> Floats:
-        """Scalar product of each residual and the next residual, (n - 1,). [m²]
+        """Scalar products of neighbouring residuals, which show motion of the platform, (n - 1,). [m²]
 
-        It shows where the residuals contain motion of the platform: its mean is 0 for white noise, and positive for
-        motion.
+        The mean of the products is 0 if the residuals are white noise, and positive if they contain motion.
         """
         return np.asarray((self.residuals[1:] * self.residuals[:-1]).sum(axis=1))
 
     def halved(self, times: Floats) -> Floats | None:
-        """Halve the pieces whose residuals contain the most motion; return the new edges.
+        """Halve the pieces of the spline whose residuals contain the most motion; return the new edges.
 
-        `times` (n,) are the times of the fixes. [s] Returns None if no piece with motion can be halved.
+        `times` (n,) [s] are the times of the fixes. Returns None if no piece with motion can be halved.
         """
         lengths, middles = np.diff(self.edges), (self.edges[1:] + self.edges[:-1]) / 2
         piece = np.clip(np.searchsorted(self.edges, times, "right") - 1, 0, len(middles) - 1)

@@ -1,14 +1,15 @@
 """Logs of the PX4 autopilot (ULog, `.ulg`): fixes of the GPS topic, or the autopilot's estimate of its position.
 
-A ULog consists of messages, each with a size, a type and a payload. Type F states the fields of a topic, type A gives
-a number to a topic, and type D is a record of the topic with the stated number. The GPS topics are
-`vehicle_gps_position` and `sensor_gps`. They have their own UTC, and heights above the ellipsoid. The topic
-`vehicle_global_position` has times since the start of the autopilot, and gets UTC from a GPS topic. GPS topics and
-global positions state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
+A ULog consists of messages, each with a size, a type and a payload. A message of type F states the fields of a topic,
+type A assigns a number to a topic, and type D is a record of the topic with that number. The GPS topics are
+`vehicle_gps_position` and `sensor_gps`. They contain UTC, and heights above the ellipsoid. The topic
+`vehicle_global_position` has only times since the start of the autopilot; its UTC is taken from a GPS topic. Both
+kinds of topic state standard deviations of each fix: `eph` is horizontal, `epv` vertical. Attitude is not read.
 
-Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg and so on, before release
-1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. The package pyulog is a reference in
-tests only: it expands every topic of a file, to any size, before it selects topics, and prints damaged messages.
+Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg etc.; before release 1.14,
+lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. The package pyulog is used only as a
+reference in tests, because it expands every topic of a file, whatever its size, before it selects topics, and because
+it prints damaged messages.
 """
 
 import struct
@@ -64,8 +65,8 @@ _MAX_CLOCK_DRIFT_S = 1.0  # due to jitter of messages; a larger drift means that
 class _Units(NamedTuple):
     """Names of the coordinate fields of a topic, and factors that convert coordinates to degrees and metres.
 
-    `height` is above the ellipsoid, and `altitude` above mean sea level. For GPS topics there are two versions of
-    these names and factors.
+    `height` is the field with the height above the ellipsoid, and `altitude` the field with the height above mean sea
+    level. GPS topics exist in two versions with different names and factors.
     """
 
     latitude: str
@@ -86,7 +87,10 @@ Records = NDArray[np.void]
 
 
 class _Topic(NamedTuple):
-    """A topic in a log: name, records, names and units of the coordinates, and instance (number) of the receiver."""
+    """A topic in a log: its name, its records, and the names and units of its coordinates.
+
+    `instance` is the number of the receiver to which the topic belongs.
+    """
 
     name: str
     records: Records
@@ -94,7 +98,7 @@ class _Topic(NamedTuple):
     instance: int = 0
 
     def column(self, field: str) -> Floats:
-        """Values of a field in all records, (n,)."""
+        """Values (n,) of a field in all n records."""
         values: Floats = self.records[field].astype(np.float64)
         return values
 
@@ -146,7 +150,7 @@ def _count(topic: _Topic) -> int:
 def _with_fixes(topic: _Topic) -> _Topic:
     """Keep only the records of a topic that have a fix.
 
-    Records of a GPS topic must also have a UTC, which is 0 until the receiver knows it.
+    Records of a GPS topic must also state UTC, which is 0 until the receiver knows the time.
     """
     records = topic.records
     if topic.name in _GPS_TOPICS:
@@ -259,9 +263,9 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
 
 
 def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
-    """Yield type, byte offset and payload of every complete message.
+    """Yield the type, byte offset and payload of every complete message in a log.
 
-    The last message may be incomplete because of a power loss; it is ignored.
+    The last message may be incomplete because of a power loss; it is then ignored.
     """
     offset, end = _HEADER_BYTES, len(data)
     unpack = struct.Struct("<HB").unpack_from
@@ -279,14 +283,14 @@ def _messages(data: bytes, name: str) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _hold_to_flags(payload: bytes, location: str) -> None:
-    """Refuse a file whose flag message contains flags of a newer ULog version that cannot be read."""
+    """Refuse a file whose flag message contains flags of a newer, unsupported version of ULog."""
     incompatible = payload[8:16]
     if incompatible[:1] > bytes([_APPENDED_DATA_FLAG_BITS]) or any(incompatible[1:]):
         raise PathFileError(f"{location}: has flags {incompatible.hex()} of a newer kind of ULog")
 
 
 def _layout(topic: str, fields: str, location: str) -> tuple[np.dtype[np.void], _Units]:
-    """NumPy data type of the required fields of a topic, and the names and units of its coordinates.
+    """Find the required fields of a topic, as a NumPy data type, and the names and units of its coordinates.
 
     `fields` is the text of the format message (F) of the topic.
     """

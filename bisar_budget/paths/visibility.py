@@ -1,11 +1,12 @@
-"""Passes of a satellite over a scene: rise, culmination and set above an elevation, and times with a given squint.
+"""Passes of a satellite over a scene: rise, culmination, set, and the times of a given squint.
 
-An orbit is sampled every two minutes in the axes of the scene, and interpolated by Lagrange polynomials through eight
-samples. Their error is centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit. All
-searches use arrays of these interpolated positions. The rate of the elevation is evaluated every half minute. An
-extremum of the elevation lies where this rate changes sign. A low orbit makes about half a revolution from one
-extremum to the next. Between two extrema the elevation only rises or only falls, so even the shortest pass is found,
-and it is found only once.
+A pass is the time during which the satellite is above a given elevation. An orbit is sampled every two minutes in the
+axes of the scene, and interpolated by Lagrange polynomials through eight samples. The interpolation error is a few
+centimetres in a low orbit, and less than a metre at the perigee of a transfer orbit. All searches use arrays of these
+interpolated positions. The rate of the elevation is evaluated every half minute. An extremum of the elevation lies
+where this rate changes sign. From one extremum to the next, a satellite in a low orbit makes about half a revolution.
+Between two extrema the elevation only rises or only falls, so even the shortest pass is found, and it is found only
+once.
 """
 
 import math
@@ -45,7 +46,7 @@ class OrbitGap(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Part of a time span, from `start` [s] to `stop` [s], in which a satellite is above an elevation.
+    """Part of a time span, from `start` [s] to `stop` [s], in which a satellite is above a given elevation.
 
     `rises` is false if the satellite is already above the elevation when the known orbits begin. `sets` is false if
     it is still above the elevation when they end.
@@ -60,8 +61,8 @@ class Stretch(NamedTuple):
 class _Sampled:
     """Samples of an orbit in the axes of a scene, from `start` [s] to `stop` [s].
 
-    They are at most two minutes apart, and are interpolated. If the orbit ends early, `stop` is earlier, and `reason`
-    is the cause.
+    The samples are at most two minutes apart, and are interpolated. If the orbit ends early, `stop` is the end of the
+    orbit, and `reason` states the cause.
     """
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
@@ -93,10 +94,10 @@ class _Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """Motion of a satellite during a time span, seen from a scene, and the parts of the span without an orbit.
+    """Motion of a satellite as seen from a scene during a time span, and the parts of the span without an orbit.
 
-    Times are seconds after `origin`. If a file has several element sets or segments, the nearest one is used at each
-    time, as `orbits_of` does for a mission.
+    Times are seconds after `origin`. If a file has several element sets or segments, the nearest of them is used at
+    each time, as in `orbits_of` for a mission.
     """
 
     origin: Instant
@@ -109,7 +110,8 @@ class Watched:
     ) -> "Watched":
         """Sample a satellite's orbits during a time span that begins at `origin`.
 
-        `orbit_at` returns the orbit at an instant, and raises `PathFileError` if there is none.
+        `orbit_at` returns the orbit that is valid at an instant, and raises `PathFileError` if there is no such
+        orbit.
         """
         pieces: list[_Sampled] = []
         gaps: list[OrbitGap] = []
@@ -130,11 +132,14 @@ class Watched:
         return np.array([piece.start for piece in self.pieces])
 
     def _of(self, times: Floats) -> NDArray[np.intp]:
-        """Index in `pieces` of the sampled orbit to which each time belongs."""
+        """Index in `pieces` of the orbit from which the position at each time is taken."""
         return np.maximum(np.searchsorted(self._starts, times, "right") - 1, 0)
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Positions [m] and velocities [m/s], each (n, 3), in scene axes, at times (n,) outside the gaps."""
+        """Positions [m] and velocities [m/s] of the satellite in scene axes, each (n, 3).
+
+        No time in `times` (n,) may be in one of the `gaps`, the parts of the time span without an orbit.
+        """
         position, velocity = np.empty((2, times.size, 3))
         piece_numbers = self._of(times)
         for number in np.unique(piece_numbers).tolist():
@@ -152,20 +157,20 @@ class Watched:
         return self.pieces[int(self._of(np.array([time]))[0])].orbit
 
     def sine_of_elevation(self, times: Floats) -> Floats:
-        """Sine of the elevation of the satellite, (n,), at times (n,)."""
+        """Sine of the elevation of the satellite at times (n,)."""
         position, _ = self.at(times)
         sine: Floats = position[:, 2] / np.linalg.norm(position, axis=1)
         return sine
 
     def _rate(self, times: Floats) -> Floats:
-        """Rate of change of the sine of the elevation, multiplied by the slant range, (n,), at times (n,). [m/s]"""
+        """Rate of change of the sine of the elevation, multiplied by the slant range, at times (n,). [m/s]"""
         position, velocity = self.at(times)
         square = np.sum(position**2, axis=1)
         rate: Floats = velocity[:, 2] - position[:, 2] * np.sum(position * velocity, axis=1) / square
         return rate
 
     def squint(self, times: Floats) -> Floats:
-        """Squint angle of the satellite, (n,), at times (n,), as `PlatformState.squint` defines it. [rad]"""
+        """Squint angle of the satellite at times (n,), as defined by `PlatformState.squint`. [rad]"""
         position, velocity = self.at(times)
         lengths = np.linalg.norm(position, axis=1) * np.linalg.norm(velocity, axis=1)
         with np.errstate(invalid="ignore"):
@@ -174,7 +179,7 @@ class Watched:
         return angle
 
     def above(self, elevation: float) -> list[Stretch]:
-        """Find the stretches of time in which the satellite is above an elevation [rad], in the order of time."""
+        """Find the stretches of time in which the satellite is above an elevation [rad], in chronological order."""
         min_sine = math.sin(elevation)
         stretches: list[Stretch] = []
         for piece in self.pieces:
@@ -231,9 +236,9 @@ def _times(start: float, stop: float) -> Floats:
 
 
 def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
-    """Times at which a function of time changes its sign, by bisection. [s]
+    """Times at which a function of time changes sign, found by bisection. [s]
 
-    The function is assumed to change sign at most once between two neighbours in `times`.
+    The function is assumed to change sign at most once between two neighbouring elements of `times`.
     """
     values = function(times)
     is_above = values > 0
@@ -250,11 +255,11 @@ def _roots(function: Callable[[Floats], Floats], times: Floats) -> Floats:
 def _orbits(
     orbit_at: Callable[[Instant], Orbit], origin: Instant, duration_s: float
 ) -> Iterator[tuple[float, float, Orbit | PathFileError]]:
-    """Divide a time span into parts with one orbit each; yield start [s], end [s] and orbit of each part.
+    """Divide a time span into parts with one orbit each; yield the start [s], end [s] and orbit of each part.
 
-    Instead of a missing orbit, the error with the reason is yielded. At each time the nearest element set is
-    used, or the segment of an ephemeris whose nearer end is farthest from the time. So each element set, and each
-    segment, has one part of the span.
+    For a part without an orbit, the error that states the reason is yielded instead of the orbit. At each time, the
+    element set with the nearest epoch is used, or, in an ephemeris, the segment in which the time is farthest from
+    both ends. Each element set or segment is therefore used in a single part of the span.
     """
     orbits: dict[float, Orbit | PathFileError] = {}
 
@@ -295,7 +300,7 @@ def _is_gap(orbit: Orbit | PathFileError) -> bool:
 
 
 def _are_same_orbit(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError) -> bool:
-    """Whether two orbits have the same epoch and span, or both are missing."""
+    """Whether two orbits have the same epoch and the same span, or are both missing."""
     if isinstance(orbit, PathFileError) or isinstance(next_orbit, PathFileError):
         return _is_gap(orbit) and _is_gap(next_orbit)
     return (orbit.epoch, orbit.span) == (next_orbit.epoch, next_orbit.span)
@@ -304,7 +309,7 @@ def _are_same_orbit(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileEr
 def _changes(orbit: Orbit | PathFileError, next_orbit: Orbit | PathFileError, origin: Instant) -> list[float]:
     """Times at which one orbit is likely to replace another. [s]
 
-    These are the ends of the spans of ephemerides, and the middle between the epochs of two element sets.
+    These are the start and end times of ephemerides, and the middle between the epochs of two element sets.
     """
     ends: list[Instant] = []
     for candidate in (orbit, next_orbit):

@@ -1,7 +1,7 @@
 """All sentences about rows, missions and verdicts: a table of templates, and functions for sentences with variants.
 
-`note(code, **quantities)` fills the template that has this code. Quantities are numbers in SI units and radians, ids
-or names.
+`note(code, **quantities)` fills the template that has this code. A quantity is a number (in SI units, angles in
+radians), an id or a name.
 """
 
 from bisar_budget.phrases.air_sentences import (
@@ -146,6 +146,6 @@ def note(code: str, /, **quantities: object) -> Note:
     Raises
     ------
     KeyError
-        No template has this code, or a field of the template has no quantity.
+        No template has this code, or no quantity is given for a field of the template.
     """
     return Note(fill(TEMPLATES[code], quantities), code, tuple(quantities.values()))

@@ -42,11 +42,11 @@ def _add_correlation_time(keys: Sequence[str]) -> str:
 def air_stays(
     aperture_time: float, correlation_time: float, key: str, size: float, use: float, keys: Sequence[str]
 ) -> str:
-    """Sentence for a verdict that takes delays in the air as constant, although the aperture is long.
+    """Sentence for a verdict that assumes constant atmospheric delays, although the aperture is long.
 
-    `aperture_time` and `correlation_time` are in s. `key` is the requirement on the effect, and `size` the effect
-    that changing delays would have, in rad, m or dB. `use` is `size` as a fraction of the allowed value. `keys` are
-    the keys to add to the file.
+    `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in rad, m
+    or dB. `key` is the requirement that limits this effect. `use` is `size` as a fraction of the allowed value.
+    `keys` are the keys to add to the file.
     """
     does, unit = _AIR_MAKES[key]
     shown = level_words(size) if unit == "dB" else size_words(size, unit)
@@ -65,10 +65,10 @@ def air_stays_untaken(
     keys: Sequence[str],
     lines: Sequence[str],
 ) -> str:
-    """Sentence for air delays taken as constant over a long aperture; no requirement would limit a change of them.
+    """Sentence for atmospheric delays assumed constant over a long aperture, if no requirement limits their changes.
 
     `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in the unit
-    of the effect. The file needs the keys `keys`, or the requirements `lines`.
+    of the effect. The file needs either the keys `keys`, or a requirement from `lines`.
     """
     added = " or ".join(f"`{line}`" for line in lines)
     return (
@@ -79,7 +79,7 @@ def air_stays_untaken(
 
 @composed
 def below_the_ionosphere(platform: str) -> str:
-    """Sentence for a platform that flies below the ionosphere, so that electron content does not delay its leg."""
+    """Sentence for a platform below the ionosphere, so that the electron content does not delay its signal."""
     if platform == "mission":
         return "both platforms fly below the ionosphere: no electrons on their legs"
     return f"the {platform} flies below the ionosphere: no electrons on its leg"
@@ -87,7 +87,7 @@ def below_the_ionosphere(platform: str) -> str:
 
 @composed
 def runs_along_the_ground(platform: str) -> str:
-    """Sentence for a leg at such a low elevation that its delay cannot be computed from the zenith delay."""
+    """Sentence for a signal path at such a low elevation that its delay cannot be computed from the zenith delay."""
     if platform == "mission":
         return "both legs run along the ground: the delay at the zenith does not give theirs"
     return f"the leg of the {platform} runs along the ground: the delay at the zenith does not give its delay"

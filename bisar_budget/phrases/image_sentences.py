@@ -60,17 +60,17 @@ def _placed(displacement: Sequence[float]) -> str:
 
 @composed
 def in_its_worst_phase(axes: int) -> str:
-    """Sentence for a vibration below one cycle per aperture, which is taken at its worst phase along each axis."""
+    """Sentence for a vibration below one cycle per aperture, with its worst phase assumed along each axis."""
     each = f", each of {axes} axes alone: their phases add up" if axes > 1 else ""
     return f"in the worst phase of the vibration{each}"
 
 
 @composed
 def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequence[float]) -> str:
-    """Sentence for errors whose joint displacement a rule of combination predicts wrongly.
+    """Sentence for several errors whose joint displacement is predicted wrongly by a rule of combination.
 
-    `by_rule` is the displacement that the rule predicts, and `is_at` the displacement by exact ranges and in the
-    image. Both have an east and a north component. [m]
+    `by_rule` is the displacement that the rule predicts. `is_at` is the displacement that follows from exact ranges
+    and is seen in the image. Both have an east and a north component. [m]
     """
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "
@@ -82,7 +82,8 @@ def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequenc
 def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
     """Sentence for a limit at which the phase in the image does not grow with the size of the error.
 
-    `phases` are the phases measured in images [rad], each with a text that states the size of the error.
+    `phases` has pairs: a phase measured in an image [rad], and a text that states the size of the error in this
+    image.
     """
     shown = ", ".join(f"{phase:.4g} rad{where}" for phase, where in phases)
     return f"the phase of the image does not grow with the error: {shown}"
@@ -92,9 +93,9 @@ def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
 def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assumed: bool) -> str:
     """Sentence for paired echoes of a vibration that were measured in an image.
 
-    `who` names what vibrates. `cycles` is the distance of the echoes from the peak in cross-range cells, and
-    `smear_cells` their smear in range cells, None to leave it out. If `is_assumed` is true, the file declares no
-    vibration, and the frequency is assumed.
+    `who` names the vibrating object. `cycles` is the distance of the echoes from the peak in cross-range cells, and
+    `smear_cells` is their smear in range cells, or None if the sentence is not to mention it. If `is_assumed` is
+    true, the file declares no vibration, and the frequency is assumed.
     """
     smeared = "" if smear_cells is None else f", smeared over {smear_cells:.2g} range cells"
     assumed = ", a frequency assumed: the file declares no vibration" if is_assumed else ""
@@ -103,7 +104,7 @@ def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assum
 
 @composed
 def sigma_of_time_series(draws: int, factor: float, images: int, bound_by: str) -> str:
-    """Sentence for an image verdict on a random error: its simulated time series, and how exact their sigma is."""
+    """Sentence for an image verdict on a random error: its simulated time series, and the uncertainty of sigma."""
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
     bound = f", bound by the {bound_by}" if bound_by else ""
     known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws

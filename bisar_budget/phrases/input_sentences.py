@@ -23,8 +23,9 @@ _SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
 class StatedError:
     """An error that the source of a path states, together with the error that the file declares.
 
-    `stated` and `declared` have a size for each of `axes`, in `unit`. Without `axes` each has one size, a
-    root-sum-square. `words` name the source of the path. `key` is the key of the mission file for the declared error.
+    `stated` and `declared` are the sizes of the two errors in `unit`, with one size for each axis in `axes`. If there
+    are no `axes`, each error has a single size, a root-sum-square. `words` names the source of the path. `key` is the
+    key of the mission file for the declared error.
     """
 
     words: str
@@ -38,14 +39,14 @@ class StatedError:
 
     @property
     def declared_words(self) -> str:
-        """Text with the sizes of the declared error, or with the remark that none is declared."""
+        """Text with the sizes of the declared error, or with the remark that no error is declared."""
         if not self.is_declared:
             return f"no {self.kind} error is declared"
         return f"{_sizes(self.declared, self.unit)} is declared"
 
 
 def _sizes(sizes: Sequence[float], unit: str) -> str:
-    """Text with several sizes of an error in `unit`. If all are equal, the size is written once."""
+    """Text with the sizes of an error along its axes, in `unit`; a single size if all are equal."""
     words = [size_words(size, unit) for size in sizes]
     return words[0] if len(set(words)) == 1 else ", ".join(words)
 
@@ -58,8 +59,8 @@ def _axes(names: Sequence[str]) -> str:
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
     """Sentence for a declared position error that is smaller than the possible error of the platform's path.
 
-    `doubt` is the possible error of the path [m]. `declared` is the declared position error [m], None if there is
-    none.
+    `doubt` is the possible error of the path [m]. `declared` is the declared position error [m], or None if no error
+    is declared.
     """
     stated = "no position error is declared" if declared is None else f"{size_words(declared, 'm')} is declared"
     return f"the path may be {size_words(doubt, 'm')} off ({words}), but {stated}: declare the error in {key}"
@@ -89,7 +90,8 @@ def log_is_flown_as_it_is(figure: str) -> str:
 def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> str:
     """Sentence for a flight log whose rounding step is large compared with the declared position error.
 
-    `step` is the rounding step along `axis` [m], and `declared` the declared error [m], None if there is none.
+    `step` is the rounding step along `axis` [m], and `declared` the declared error [m], or None if no error is
+    declared.
     """
     beside = "no position error is declared"
     if declared is not None:

@@ -1,4 +1,4 @@
-"""Sentences about limits that are exceeded by the published or full model, and about the rules behind limits."""
+"""Sentences about limits that are exceeded according to a model, and about the rules for limits."""
 
 from bisar_budget.phrases.notes import composed
 from bisar_budget.phrases.templates import in_brackets, over_words, size_words
@@ -47,8 +47,8 @@ _SHOWN_PART_FRACTION = 0.99  # of a phase of equal loss, below which its quadrat
 def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
     """Sentence for one error whose quadratic phase exceeds its limit.
 
-    `phase` [rad] is the quadratic phase by itself, or the quadratic phase of equal peak loss. In the second case
-    `quadratic` [rad] is its quadratic part alone.
+    `phase` [rad] is the quadratic phase of the error. If the error also has a hidden phase, `phase` is the quadratic
+    phase that would cause the same peak loss as both together, and `quadratic` [rad] is the actual quadratic phase.
     """
     text = in_brackets(f"QPE {over_words(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= _SHOWN_PART_FRACTION * phase:  # both are infinite where there is no image
@@ -67,7 +67,7 @@ def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
 def location_over(moved: float | None, limit: float, equation: str) -> str:
     """Sentence for one error that displaces the image by more than `limit` [m].
 
-    `moved` is the displacement [m], None if there is no image.
+    `moved` is the displacement [m], or None if no image point exists.
     """
     where = "beyond every ground point" if moved is None else f"by {format_quantity(moved, 'm')}"
     return f"moves the image {where}, {format_limit(limit, 'm')} allowed ({equation})"
@@ -79,8 +79,9 @@ def aggregate_over(
 ) -> str:
     """Sentence for a total of several errors that exceeds its limit.
 
-    `what` names the total, `size` is its value in `unit`. `row_id` and `largest` are the row and size of the largest
-    error. `extrapolated` is a remark if the total relies on extrapolated noise or a folded spur, else empty.
+    `what` names the total, and `size` is its value in `unit`. `row_id` is the row of the largest error in the total,
+    and `largest` is the size of this error. `extrapolated` is a remark that the total relies on extrapolated noise or
+    on a folded spur, or is empty.
     """
     text = f"{what} {over_words(size, limit, unit)}; largest: {row_id}, {size_words(abs(largest), unit)}"
     return in_brackets(text, extrapolated)
@@ -88,7 +89,10 @@ def aggregate_over(
 
 @composed
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
-    """Sentence for a row or a total of errors that passes by the gating model, but fails by the other model."""
+    """Sentence for a row or a total of errors that passes in the deciding model, but fails in the other model.
+
+    There are two models, the published and the full model. The deciding model is the model whose verdict counts.
+    """
     text = f"fails by the {model} model: {what}".rstrip()
     return in_brackets(f"{text} {over_words(size, limit, unit)}", equation)
 
@@ -99,8 +103,8 @@ def published_model_does_not_hold(
 ) -> str:
     """Sentence for a mission to which the published model does not apply, with one row as an example.
 
-    `published` and `full` are the allowables of the row by the two models in `unit`; None means that there is no
-    limit. `others` is the number of other declared errors for which the models differ by more than 5 %.
+    `published` and `full` are the allowables of this row according to the two models, in `unit`; None means that
+    there is no limit. `others` is the number of other declared errors for which the models differ by more than 5 %.
     """
     by_published, by_full = (
         "without limit" if size is None else format_limit(size, unit) for size in (published, full)

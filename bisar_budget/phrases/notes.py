@@ -8,7 +8,7 @@ P = ParamSpec("P")
 
 
 class Note(str):
-    """A sentence as data: `code` names the sentence, and `values` are its numbers in SI units, ids and names."""
+    """A sentence with its data: `code` identifies it, and `values` are its numbers in SI units, ids and names."""
 
     __slots__ = ("code", "values")
     code: str
@@ -21,7 +21,10 @@ class Note(str):
         return note
 
     def then(self, *more: str) -> "Note":
-        """Append texts, separated by semicolons. Empty texts are left out, and an empty note stays empty."""
+        """Append strings to the note, separated by semicolons.
+
+        Empty strings are left out, and an empty note stays empty.
+        """
         if not self:
             return self
         return Note("; ".join(filter(None, (self, *more))), self.code, (*self.values, *filter(None, more)))

@@ -55,7 +55,8 @@ def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> 
 def effect_is_not_judged(effect_name: str, size: float, total: float, lines: Sequence[str]) -> str:
     """Sentence for a row with an effect that no requirement limits.
 
-    `size` is the effect of the row alone, and `total` that of all errors together. `lines` are requirements to add.
+    `size` is the effect of the row alone, and `total` the effect of all errors together. `lines` are requirements
+    that would limit the effect; the sentence proposes to add any of them to the file.
     """
     alone = f", {total:.3g} rad with the others" if total > 1.005 * size else ""
     added = " or ".join(f"`{line}`" for line in lines)
@@ -66,7 +67,8 @@ def effect_is_not_judged(effect_name: str, size: float, total: float, lines: Seq
 def effect_is_negligible(effect_name: str, total: float, keys: Sequence[str]) -> str:
     """Sentence for a mission with a negligible effect that no requirement limits.
 
-    `total` is the effect of all errors together. `keys` are the requirements that would limit it.
+    `total` is the size of the effect for all errors together. `keys` are the requirements that would limit the
+    effect.
     """
     return (
         f"negligible: {effect_words(effect_name, total)} in all, which no requirement judges "
@@ -82,9 +84,9 @@ def nothing_judges(key: str) -> str:
 
 @composed
 def not_declared_as_required(key: str, lacks: str = "") -> str:
-    """Sentence for a required error that is not declared, or only in part.
+    """Sentence for a required error that is not declared, or is declared only in part.
 
-    If it is declared in part, `lacks` is the key that the file lacks.
+    `key` is the key of the error. If the error is declared only in part, `lacks` is the missing key.
     """
     if lacks:
         return f"requirements.declare asks for {key}, which is declared in part: the file has no {lacks}"
@@ -93,7 +95,7 @@ def not_declared_as_required(key: str, lacks: str = "") -> str:
 
 @composed
 def declarations_are_missing(keys: Sequence[str]) -> str:
-    """Sentence for a mission file that does not declare all required errors; it lists the missing ones."""
+    """Sentence for a mission file that does not declare all required errors; it lists the missing errors."""
     *others, last = keys
     said = f"{', no '.join(others)} and no {last}" if others else last
     return f"the file has no {said}, which requirements.declare asks for"

@@ -2,14 +2,15 @@
 
 A field of a template, `{name:format}`, names a quantity and its format:
 
-- a unit (`{length:m}`, `{level:dB}`): three digits with a readable prefix; `{length:m 2}`: two; `{level:dB down}`:
-  rounded down; `{phase:rad}` three digits without a prefix, to compare with π/4;
+- a unit (`{length:m}`, `{level:dB}`): three digits with a readable prefix; `{length:m 2}`: two digits;
+  `{level:dB down}`: rounded down; `{phase:rad}`: three digits without a prefix, for comparison with π/4;
 - `{size:size m}`: a magnitude, which may be infinite; `{limit:limit m}`: a limit, rounded down;
 - `{acceleration:m/s^2 as g}`: in another unit of the same dimension;
-- `{share:percent}`: a fraction in percent with three digits; `{share:percent .0f}` in a format of Python;
+- `{share:percent}`: a fraction in percent with three digits; `{share:percent .0f}`: in a format of Python;
 - `{time:min}`: seconds in minutes; `{cycles:cycles}`: three digits rounded down, without a unit;
 - `{rows:count row}`: a count with its noun;
-- `{ids:list}`, `{keys:and}`, `{keys:or}`: items joined; `{names:and platforms.*.oscillator}` each within a pattern;
+- `{ids:list}`, `{keys:and}`, `{keys:or}`: several items joined; `{names:and platforms.*.oscillator}`: the same,
+  with each item in place of the `*` of a pattern;
 - a format of Python (`{factor:g}`).
 
 A unit may be a field itself: `{size:size {unit}}`.
@@ -107,7 +108,7 @@ class _Filler(string.Formatter):
     """Formatter that fills the fields of a template. A field without a value raises `KeyError`."""
 
     def format_field(self, value: object, format_spec: str) -> str:
-        """Write one quantity in the format that its field in the template specifies."""
+        """Write a quantity in the format that is specified by its field in the template."""
         name, _, options = format_spec.partition(" ")
         if name in _QUANTITY_FORMATS:
             return _QUANTITY_FORMATS[name](value, options)
@@ -123,9 +124,9 @@ def fill(template: str, quantities: Mapping[str, object]) -> str:
     Raises
     ------
     KeyError
-        A field of the template has no quantity.
+        No quantity is given for a field of the template.
     TypeError
-        A quantity is no number, or not several items, but its format needs one.
+        A quantity is not a number, or not a sequence, although its format requires it.
     """
     return _FILLER.vformat(template, (), quantities)
 

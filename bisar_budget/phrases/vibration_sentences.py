@@ -83,9 +83,11 @@ def published_rule_is_off(margin_db: float) -> str:
 
 @composed
 def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
-    """Sentence for a vibration of which only the component along the line of sight acts on the range.
+    """Sentence for a vibration whose effect on the range is limited to its component along the line of sight.
 
-    `along` is this component [m]. With a direct path, it is the change of the range minus the direct path.
+    `stated` is the vibration as stated in the file, as text. `along` [m] is its component along the line of sight. If
+    the receiver uses the direct path as its clock, `along` [m] is the change that the vibration causes in the
+    difference between the range and the direct path.
     """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
@@ -95,7 +97,9 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
 def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
     """Sentence for a slow vibration along several axes, with its equivalent amplitude along the line of sight.
 
-    `along` is this amplitude [m]. With a direct path, it is that of the range minus the direct path.
+    `stated` is the vibration as stated in the file, as text. `along` [m] is the equivalent amplitude. If the receiver
+    uses the direct path as its clock, `along` [m] is the equivalent amplitude of the difference between the range and
+    the direct path.
     """
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: in the worst phase equivalent to {format_quantity(along, 'm')} {where}"
@@ -105,7 +109,8 @@ def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: 
 def spectrum_shakes(rms: float, level_db: float) -> str:
     """Sentence for a vibration stated as a spectrum.
 
-    `rms` is its rms value along the line of sight [m], and `level_db` the shift of the spectrum in level [dB].
+    `rms` [m] is the rms value of the vibration along the line of sight, and `level_db` [dB] is the amount by which
+    the spectrum is shifted.
     """
     shift = f", shifted by {level_db:g} dB" if level_db else ""
     return f"{format_quantity(rms, 'm')} rms along the line of sight{shift}, slow parts included"

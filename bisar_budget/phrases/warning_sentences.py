@@ -53,8 +53,8 @@ WARNING_SENTENCES: dict[str, str] = {
 def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
     """Sentence for a flight log whose noise makes the acceleration of the path uncertain.
 
-    `acceleration` is the 1-sigma uncertainty of the acceleration [m/s²]. `change` is the largest relative change of
-    an allowable that it causes, in row `row_id`.
+    `acceleration` is the 1-sigma uncertainty of the acceleration [m/s²]. This uncertainty changes the allowable of
+    row `row_id` the most, by the fraction `change`.
     """
     size = format_quantity(acceleration, "m/s^2")
     by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
@@ -69,8 +69,8 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
     """Sentence for a straight path with the speed of a satellite.
 
-    `speed` is in m/s. `acceleration` has the components of the acceleration on a circular orbit [m/s²], which the
-    path lacks.
+    `speed` is in m/s. `acceleration` has the components of the acceleration that the path would have on a circular
+    orbit [m/s²].
     """
     return (
         f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, but the path is straight. "
@@ -85,8 +85,8 @@ def satellite_does_not_fall(
     """Sentence for a path that is as high as a satellite's, but not in free fall.
 
     `height` is in m. `departure` is the difference from the acceleration of free fall, as a fraction of gravity.
-    `phase` is the quadratic phase that the dynamics of an orbit may add to the declared errors. [rad]
-    `acceleration` has the components of the acceleration of free fall. [m/s²]
+    `phase` [rad] is the largest quadratic phase that the declared errors may cause in addition because of the
+    dynamics of an orbit. `acceleration` has the components of the acceleration of free fall [m/s²].
     """
     missing = "" if has_axes else " If the acceleration is Earth-fixed, add scene.latitude, longitude and height."
     return (
@@ -99,7 +99,7 @@ def satellite_does_not_fall(
 
 
 def _of_free_fall(acceleration: Sequence[float], has_axes: bool) -> str:
-    """Words for the acceleration of free fall, as a line of the file, and what it takes into account."""
+    """Text with the acceleration of free fall as a line for the mission file, and with the effects included in it."""
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"

@@ -4,10 +4,10 @@ The utilization of a row of the budget is its error divided by its limit. Each r
 utilization. An error contributes a power of its size to the row: the square if errors combine by root-sum-square or
 if their powers add, and the size itself if errors add linearly. The errors without a specification use a part of each
 allowed utilization. The search divides the remaining part among the specified errors so that the sum of
-weight·log(size) is largest; the module `geometric_program` solves this problem. Phases follow from exact ranges, so
-they are valid for errors of any size, but not proportional to the size. Each round of the search therefore makes full
-checks with each error 20 % larger and 20 % smaller than in the round before, and measures the contribution of the
-error to each row. The search ends when the sizes no longer change. Values are in SI and radians.
+weight·log(size) is largest; the module `geometric_program` solves this problem. The phases follow from exact ranges.
+They are valid for errors of any size, but they are not proportional to the size. In each round of the search, full
+checks are therefore made with each error 20 % larger and 20 % smaller than in the round before, to determine the
+contribution of the error to each row. The search ends when the sizes no longer change. Values are in SI and radians.
 """
 
 import datetime as dt
@@ -49,23 +49,23 @@ class AllocationSettings:
     Attributes
     ----------
     settled_change : float
-        The search ends when the logarithm of every size changes by less than this.
+        The search ends when the logarithm of every size changes by less than this value from one round to the next.
     max_rounds : int
         Largest number of rounds. Four are enough if effects are proportional to errors.
     full_step_rounds : int
-        Number of rounds that change the sizes by the full computed change. Later rounds change them by half of it,
-        because full changes can oscillate.
+        Number of rounds in which the full computed change is applied to the sizes. In later rounds half of it is
+        applied (on a logarithmic scale), because full changes can oscillate.
     end_steps : int
         Number of sizes that are tried between two known sizes, to find the largest size at which an image forms.
     max_shrinks : int
         Largest number of times that all sizes are reduced by a tenth. All these reductions together amount to 18
         orders of magnitude.
     free_ratio : float
-        Ratio of the largest to the smallest size that is tried for an error that no row seems to limit.
+        For an error that no row seems to limit: ratio of the largest to the smallest size that is tried.
     free_steps : int
         Number of sizes that are tried in the range of `free_ratio`.
     free_fraction : float
-        Largest fraction of any allowed utilization that may be used by an error that no row seems to limit.
+        For an error that no row seems to limit: largest fraction of an allowed utilization that it may use.
     close_fraction : float
         Margin that is kept below an allowed utilization when sizes are reduced, as a fraction of this utilization.
     """
@@ -136,9 +136,10 @@ def allocate(
 
 
 def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, float] | None:
-    """Return weights of the errors to specify, by key; keys given without weights get the weight 1, None stays None.
+    """Return the weights of the errors to specify, by key.
 
-    Raises `QuestionError` for a weight that is not a positive number.
+    Keys that are given without weights get the weight 1. The result is None if `keys` is None. Raises `QuestionError`
+    for a weight that is not a positive number.
     """
     if not isinstance(keys, Mapping):
         return keys if keys is None else dict.fromkeys(keys, 1.0)
@@ -149,9 +150,9 @@ def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, 
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
-    """Make the message for a mission with `combine: each`, for which no joint sizes exist.
+    """Make the error message for a mission with `combine: each`, for which no joint sizes of errors exist.
 
-    With this rule every error is judged alone. The message therefore lists the allowable size of each error.
+    With this rule every error is judged alone. The error message therefore lists the allowable size of each error.
     """
     errors = specified_errors(mission, tree_of(mission), keys)
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
@@ -170,7 +171,10 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
 
 
 def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
-    """Find the rows in which the errors without a specification leave no room for specified errors."""
+    """Find the rows in which errors without a specification already use the allowed utilization.
+
+    Such a row leaves no room for the specified errors.
+    """
     no_errors = np.array([error.nothing for error in specified_mission.specified])
     # Rows that cannot be judged even without the specified errors do not limit them.
     rows = specified_mission.judged(no_errors[:, None]).rows
@@ -198,9 +202,9 @@ class _SizeSearch:
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
         """Find the largest sizes, and the rows that limit them.
 
-        Returns the sizes (sizes,), with NaN for an error that no row limits, and the limiting rows, the most
-        restrictive row first. The search is iterative: each round evaluates the utilizations near the sizes found in
-        the previous round.
+        Returns two values: the sizes (sizes,), which are NaN for errors that no row limits, and the limiting rows,
+        with the most restrictive row first. In each round, the search evaluates the utilizations near the sizes found
+        in the previous round.
         """
         sizes = self._first_sizes()
         inside, is_extended = np.minimum(self.mission.tiny, sizes), False
@@ -234,9 +238,9 @@ class _SizeSearch:
     def _free_sizes(self, sizes: Floats, is_free: Booleans) -> Floats:
         """Enlarge the sizes of errors that no row seems to limit, and return all sizes (sizes,).
 
-        The new size of an error is the last tried size before the error uses more than the fraction `free_fraction`
-        of any allowed utilization. `is_free` marks the errors to enlarge, (sizes,). Other sizes are returned
-        unchanged.
+        The size of such an error is increased in steps until the error uses more than the fraction `free_fraction` of
+        an allowed utilization; the last size before this point is returned. `is_free` marks the errors to enlarge,
+        (sizes,). The other sizes are returned unchanged.
         """
         extended = sizes.copy()
         for index in np.flatnonzero(is_free).tolist():
@@ -258,11 +262,11 @@ class _SizeSearch:
         return extended
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Update `ends`, the sizes of the errors at and above which no image forms.
+        """Update `ends`, which holds for each error the size at and above which no image forms.
 
-        `sizes` (sizes,) are the sizes to try and `inside` (sizes,) are sizes at which an image forms. For each error,
-        the mission is checked with the size of this error from `sizes` and the other sizes from `inside`. Only the
-        ends of errors that prevent an image in this check are updated.
+        `sizes` (sizes,) are the sizes to try, and `inside` (sizes,) are sizes at which an image forms. For each
+        error, the mission is checked with the size of this error from `sizes` and the sizes of all other errors from
+        `inside`. An element of `ends` is updated only if this check finds no image.
         """
         count = sizes.size
         cases = np.repeat(inside[:, None], count, axis=1)
@@ -273,7 +277,7 @@ class _SizeSearch:
     def _end_between(self, index: int, inside: Floats, high: float) -> float:
         """Find the largest size of the error with index `index` at which an image still forms.
 
-        Sizes from `inside[index]`, at which an image forms, to `high` are tried. The other errors keep their sizes
+        Sizes from `inside[index]`, at which an image forms, to `high` are tried. All other errors have the sizes in
         `inside`.
         """
         low = float(inside[index])
@@ -287,7 +291,7 @@ class _SizeSearch:
         return low
 
     def _first_sizes(self) -> Floats:
-        """Choose initial sizes for the search, (sizes,), so small that all errors together exceed no limit."""
+        """Choose initial sizes for the search, (sizes,), small enough that all errors together exceed no limit."""
         count = self.mission.tiny.size
         cases = np.repeat(self.mission.tiny[:, None], count + 1, axis=1)
         cases[np.arange(count), np.arange(1, count + 1)] *= 2
@@ -304,9 +308,9 @@ class _SizeSearch:
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
         """Reduce the sizes until no row exceeds its allowed utilization.
 
-        Returns the sizes (sizes,), with NaN for an error that no row limits, and the limiting rows with the shares of
-        each error. `before` contains the constraints on the location error from earlier rounds of the search, in
-        which the direction of the largest displacement was different.
+        Returns two values: the sizes (sizes,), which are NaN for errors that no row limits, and the limiting rows,
+        with the share of their limits that each error uses. `before` contains the constraints on the location error
+        from earlier rounds of the search, in which the largest displacement had a different direction.
         """
         near = self.mission.near(sizes)
         for _ in range(ALLOCATION_SETTINGS.max_shrinks):
@@ -339,10 +343,11 @@ class _SizeSearch:
     def _with_earlier(
         before: Rows, program_multipliers: Floats, near: Near, sizes: Floats, shares: Floats, multipliers: Floats
     ) -> None:
-        """Merge constraints for earlier directions of the largest displacement into the row of the location error.
+        """Merge earlier constraints on the location error into the row of the location error.
 
-        The multipliers of the constraints `before` are added to the multiplier of the row. The shares of the errors
-        are averaged with the multipliers as weights. `shares` and `multipliers` are changed in place.
+        The constraints `before` are from earlier rounds of the search, in which the largest displacement had a
+        different direction. Their multipliers are added to the multiplier of the row. The shares of the errors are
+        averaged with the multipliers as weights. `shares` and `multipliers` are changed in place.
         """
         if not before.room.size:
             return
@@ -356,17 +361,18 @@ class _SizeSearch:
             multipliers[index] = total
 
     def _used(self, near: Near, sizes: Floats) -> Floats:
-        """Compute the utilizations (rows,) of the rows of `near` if the errors have the sizes `sizes`, (sizes,)."""
+        """Compute the utilizations (rows,) of the rows in `near` for given sizes of the errors, (sizes,)."""
         row_uses = self.mission.uses(sizes[:, None])
         uses = dict(zip(row_uses.ids, row_uses.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
 
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
-        """Yield the rows that limit the sizes, the row with the largest multiplier first.
+        """Yield the rows that limit the sizes, in descending order of their multipliers.
 
-        `used` (rows,) are the utilizations. In a row with the exponent p, the p-th powers of the contributions of the
-        errors add. `parts` (limiting rows, sizes) are these p-th powers, divided by the p-th power of the allowed
-        utilization. `multipliers` (limiting rows,) describe how strongly each row limits the sizes, see `RowUse`.
+        `used` (rows,) are the utilizations of the rows in `near`. In a row with the exponent p, the p-th powers of
+        the contributions of the errors add. `parts` (limiting rows, sizes) are these p-th powers, divided by the p-th
+        power of the allowed utilization. `multipliers` (limiting rows,) describe how strongly each row limits the
+        sizes, see `RowUse`.
         """
         row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():
@@ -384,9 +390,10 @@ class _SizeSearch:
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Return, for each requirement, the largest share that one error has in any row of that requirement.
+    """Return, for each requirement, the largest share of a row's limit that an error uses.
 
-    `key` is the key of the error. The result is keyed by requirement.
+    Only rows that belong to the requirement are considered. `key` is the key of the error. The result maps
+    requirements to shares.
     """
     shares: dict[str, float] = {}
     for row in rows:
@@ -399,7 +406,11 @@ def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
 def _sheet(
     specified_mission: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
 ) -> SpecificationSheet:
-    """Make the sheet of specifications from the sizes found, and check the mission with the specified sizes."""
+    """Make the sheet of specifications from the sizes found by the search.
+
+    It includes the findings of a check of the mission with the specified sizes. `broken` are rows that leave no room
+    for specified errors.
+    """
     parts = catalogue(specified_mission.stated)
     specifications = tuple(
         _specification(specified_mission.stated, error, float(error.numbers(np.array(size))), rows, parts)

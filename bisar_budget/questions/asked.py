@@ -109,8 +109,8 @@ class Asked:
         Raises
         ------
         QuestionError
-            A value is invalid by itself, such as a part that is not in the catalogue. Or the mission is invalid with
-            every string value of a key, for the same reason.
+            A value is invalid by itself, such as a part that is not in the catalogue, or the mission is invalid for
+            the same reason with every string value of a key.
         """
         for choices, words in words_of(self.cases):
             problems = set()
@@ -133,8 +133,8 @@ class Asked:
     def _hold_to_a_mission(self, number: Number) -> None:
         """Raise `QuestionError` if the mission is invalid with every tried value of a key.
 
-        The first, the middle and the last value are tried. The error is raised only if all three fail for the same
-        reason.
+        The first, the middle and the last value are tried. The error is raised only if the mission is invalid with
+        all three for the same reason.
         """
         problems = set()
         for index in {0, self.cases.count // 2, self.cases.count - 1}:
@@ -149,7 +149,7 @@ class Asked:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def _columns(self, missions: Sequence[Mission]) -> Iterator[Column]:
-        """Yield the requested columns; raises `QuestionError` for an unknown field, or a row that no mission has."""
+        """Yield the requested columns; raises `QuestionError` if a field is unknown, or no mission has the row."""
         rows: dict[str, Row] = {}
         for mission in missions:
             rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
@@ -209,9 +209,10 @@ class Asked:
 
     @cached_property
     def travelling(self) -> Question:
-        """The question in a form that can be sent to other processes.
+        """The question of the sweep in a form that can be sent to other processes.
 
-        It contains the content of all files that the mission names.
+        A question is the mission with its varied keys and requested columns. In this form it also contains the
+        content of all files that the mission names.
         """
         words = [SetValue(choices.key, word) for choices, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
@@ -238,11 +239,11 @@ class Asked:
         }
 
     def shared_out(self, starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None) -> Iterator[Part]:
-        """Check the chunks that begin at `starts`, and yield their parts in this order.
+        """Check the chunks that begin at the cases `starts`, and yield their results, usually in this order.
 
         `jobs` processes share the work only if many cases have to be read one by one, because cases in arrays take
-        less time to check than to send to another process. With `mapped`, other workers check all chunks, and parts
-        come in any order.
+        less time to check than to send to another process. If `mapped` is given, it distributes all chunks to other
+        workers, and the order of the results is arbitrary.
         """
         stops = ((start, self.chunks.stop(start)) for start in starts)
         blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
@@ -275,7 +276,7 @@ def _table(question: Question) -> Table:
 
 
 def part_of(question: Question, block: Block) -> Part:
-    """Check a block of cases in another process, which keeps the table of its last question."""
+    """Check a block of cases; worker processes call this function, and keep the table of the last question."""
     return _table(question).part(*block)
 
 

@@ -45,15 +45,15 @@ _KEY_HEADER_PATTERN = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([
 
 # ---------------------------------------------------------------- cases of arrays
 def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
-    """Make the cases for every combination of the given values; the last key varies fastest.
+    """Make a case for every combination of the given values; the last key varies fastest.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file, as strings, lists and mappings.
     values : mapping
-        Array of values (n,) for each key: numbers in SI, or strings. A number that a key does not accept is only
-        detected when its case is checked.
+        Array of values (n,) for each key: numbers in SI, or strings. A number that a key does not accept is detected
+        only when its case is checked.
 
     Raises
     ------
@@ -83,9 +83,9 @@ def grid_of(tree: JsonObject, values: Mapping[str, ArrayLike]) -> Cases:
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
-    """Convert the string values of an option to an array; raises `QuestionError` for an invalid value.
+    """Convert the string values of an option to an array, and raise `QuestionError` for an invalid value.
 
-    Names of parts and files are only checked when the mission is read with them.
+    Names of parts and files are checked only when the mission is read with them.
     """
     for word in dict.fromkeys(words):
         if problem := _wrong_word(choices, word):
@@ -96,8 +96,8 @@ def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
 def _wrong_word(choices: Choices, word: str) -> str:
     """Describe why a key does not accept a string value.
 
-    Returns an empty string if the key accepts the value, or if this can only be decided by reading the mission with
-    it.
+    Returns an empty string if the key accepts the value, or if this can be decided only by reading the mission with
+    the value.
     """
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
@@ -110,9 +110,9 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """Parsed option `--vary`: the varied key with its values.
+    """Parsed option `--vary`: the varied key and its values.
 
-    The values are strings, numbers in SI, or the ends and the count of a range.
+    The values are strings, numbers in SI, or the ends of a range and the number of its values.
     """
 
     option: str
@@ -124,11 +124,11 @@ class _Asked(NamedTuple):
 
 
 def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
-    """Make the cases for every combination of the values in the options `--vary`.
+    """Make a case for every combination of the values in the options `--vary`.
 
-    An option is `KEY=FROM:TO UNIT:COUNT`, followed by `:log` for equal ratios, or `KEY=VALUE,VALUE,...`. For keys
-    whose values are strings the option is `KEY=WORD,WORD,...`. A range includes both ends. Values are rounded in the
-    unit of the option, so that 0:180deg:181 contains exactly 60 deg.
+    An option has the form `KEY=FROM:TO UNIT:COUNT`, with `:log` appended for values at equal ratios, or the form
+    `KEY=VALUE,VALUE,...`. For keys whose values are strings the form is `KEY=WORD,WORD,...`. A range includes both
+    ends. Values are rounded in the unit of the option, so that `0:180deg:181` contains exactly 60 deg.
 
     Parameters
     ----------
@@ -142,14 +142,15 @@ def grid(tree: JsonObject, texts: Sequence[str], name: str = "--vary") -> Cases:
     Raises
     ------
     QuestionError
-        A key is unknown, repeated or has no number, a range is empty or reversed, or a key does not accept a value.
+        A key is unknown, is repeated, or accepts neither numbers nor strings; a range is empty or reversed; or a key
+        does not accept a value.
     """
     every = [(asked.varied, _axis(asked)) for asked in _all_asked(tree, texts, name)]
     return Cases(tuple(varied for varied, _ in every), tuple(axis for _, axis in every), is_grid=True)
 
 
 def _axis(asked: _Asked) -> Values:
-    """Compute the values of one option of a grid.
+    """Compute the values of a key from its option `--vary`, for a grid.
 
     Raises `QuestionError` if the option is a range without a valid count.
     """
@@ -167,22 +168,22 @@ def _axis(asked: _Asked) -> Values:
 
 
 def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
-    """Draw a Latin hypercube sample: each of `COUNT` equal parts of a range contains exactly one value.
+    """Draw the cases as a Latin hypercube sample: each of `COUNT` equal parts of a range contains exactly one value.
 
     Parameters
     ----------
     tree : dict
         Content of the mission file, as strings, lists and mappings.
     texts : sequence of str
-        As in `grid`. Counts of ranges are ignored, lists of numbers are refused, and all strings of a key are drawn
-        equally often.
+        Options `--vary` as in `grid`. Counts of ranges are ignored, lists of numbers are refused, and all strings of
+        a key are drawn equally often.
     how : str
         `latin:COUNT:SEED`; the same seed gives the same cases.
 
     Raises
     ------
     QuestionError
-        As in `grid`; also if the method, count or seed of `how` is invalid.
+        In the same situations as in `grid`, and if the method, count or seed in `how` is invalid.
     """
     option = f"--sample {shown(how)}"
     kind, *fields = (field.strip() for field in how.split(":"))
@@ -212,7 +213,10 @@ def sample(tree: JsonObject, texts: Sequence[str], how: str) -> Cases:
 
 
 def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_Asked]:
-    """Parse all options; raises `QuestionError` if there are no options, or if a key is repeated."""
+    """Parse all options `--vary`, and raise `QuestionError` if there are no options or if a key is repeated.
+
+    `name` is the name of the option for messages.
+    """
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_ACCEPTED_VARIATIONS}")
     seen: set[tuple[str, ...]] = set()
@@ -226,7 +230,10 @@ def _all_asked(tree: JsonObject, texts: Sequence[str], name: str) -> Iterator[_A
 
 
 def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
-    """Parse the text of one option, and check its values against the bounds of the key."""
+    """Parse the text of one option `--vary`, and check its values against the bounds of the key.
+
+    `name` is the name of the option for messages.
+    """
     key, equals, values_text = (field.strip() for field in text.partition("="))
     option = f"{name} {shown(text)}"
     if not (key and equals and values_text):
@@ -251,9 +258,10 @@ def _asked(tree: JsonObject, text: str, name: str) -> _Asked:
 
 
 def _range(option: str, number: Number, fields: list[str]) -> _Asked:
-    """Parse the range of an option `--vary`.
+    """Parse an option `--vary` that gives a range.
 
-    `fields` are the colon-separated fields of the range.
+    `fields` are the fields of the range, which are separated by colons. `option` is the option as written, for
+    messages.
     """
     if is_log := len(fields) > 2 and fields[-1] == "log":
         fields.pop()
@@ -271,9 +279,9 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Parse the values of an option; a value without a unit takes the unit of the last value.
+    """Parse the values of an option; a value without a unit has the unit of the last value.
 
-    Returns the number with the unit of the last value, and the values in SI.
+    Returns the varied number, with the unit of the last value, and the values in SI.
     """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
@@ -289,8 +297,8 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 def _usable_unit(unit: str, dimension: Dimension) -> str:
     """Choose the unit in which values of an option are spaced or rounded.
 
-    The result is `unit`, or the SI unit if `unit` is empty or its zero is offset from that of the SI unit. The result
-    is empty if the dimension has no suitable unit.
+    The result is the SI unit if `unit` is empty, or if the zero point of `unit` differs from the zero point of the SI
+    unit. Otherwise it is `unit`. The result is empty if the dimension has no suitable unit.
     """
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
@@ -299,7 +307,7 @@ def _usable_unit(unit: str, dimension: Dimension) -> str:
 def _count(text: str, subject: str, least: int, hint: str = "") -> int:
     """Parse an integer that must be at least `least`.
 
-    If the text is invalid, an error is raised whose message begins with `subject` and ends with `hint`.
+    If the text is invalid, `QuestionError` is raised with a message that begins with `subject` and ends with `hint`.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= 18 and int(text) >= least):
         raise QuestionError(f"{subject} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
@@ -307,7 +315,10 @@ def _count(text: str, subject: str, least: int, hint: str = "") -> int:
 
 
 def _spread(asked: _Asked, fractions: Floats) -> Floats:
-    """Compute the values in SI at fractions of a range; the fractions 0 and 1 give exactly the ends of the range."""
+    """Compute the values at given fractions of a range, in SI.
+
+    The fractions 0 and 1 give exactly the ends of the range.
+    """
     low, high = asked.ends
     factor, divisor = asked.varied.scale
     first, last = low / factor * divisor, high / factor * divisor
@@ -333,7 +344,7 @@ def sampled_cases(cases: Cases, count: int) -> Cases:
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Yield each varied key whose values are strings, with the list of its distinct values."""
+    """Yield each varied key whose values are strings, and the list of its distinct values."""
     for varied, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(varied, Choices):
             yield varied, list(dict.fromkeys(words.tolist()))
@@ -341,7 +352,10 @@ def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
 
 # ---------------------------------------------------------------- cases of a file
 def table_file(tree: JsonObject, path: str) -> Cases:
-    """Read the cases of a CSV file, as in `table`; raises `TableError` also for an unreadable or too large file."""
+    """Read the cases from a CSV file, as in `table`.
+
+    Raises `TableError` in the same situations as `table`, and if the file is unreadable or too large.
+    """
     if kind := special_file(path):
         raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
     try:
@@ -356,11 +370,11 @@ def table_file(tree: JsonObject, path: str) -> Cases:
 
 
 def table(tree: JsonObject, text: str, file: str) -> Cases:
-    """Read cases from CSV: the first line has a header `KEY [unit]` for each column, each further line is a case.
+    """Read cases from CSV: the first line has a header `KEY [unit]` for each column, and each further line is a case.
 
-    Empty lines and lines that begin with `#` are ignored. Dimensionless numbers need no unit, and strings have none.
-    An unknown string is an error in the table. A number that a key does not accept is only detected when its case is
-    checked.
+    Empty lines and lines that begin with `#` are ignored. Dimensionless numbers need no unit, and keys whose values
+    are strings have no unit. An unknown string is an error in the table. A number that a key does not accept is
+    detected only when its case is checked.
 
     Parameters
     ----------
@@ -425,7 +439,7 @@ def table(tree: JsonObject, text: str, file: str) -> Cases:
 
 
 def _cells(line: str) -> Iterator[tuple[int, str]]:
-    """Yield the position of each cell of a line, in characters from 1, and its text without quotes."""
+    """Yield the position of each cell of a line, in characters counted from 1, and its content without quotes."""
     at = 1
     for cell in line.split(","):
         word = cell.strip()
@@ -435,7 +449,7 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _headed(tree: JsonObject, header: str, line_number: int, file: str) -> tuple[Varied, ...]:
-    """Read the keys and their units from the header of a table; raises `TableError` if a cell is faulty."""
+    """Read the keys and their units from the header of a table, and raise `TableError` if a cell is faulty."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
         raise TableError.of_faults(file, [Fault(line_number, 1, "", "has no header", accepted=accepted)])
@@ -487,8 +501,8 @@ def _row(
 ) -> list[float] | Fault:
     """Read the values of one line of a table, or return the first fault of the line.
 
-    Strings are replaced by numbers. `words` contains a mapping from strings to numbers for each column; new strings
-    are added to it.
+    Strings are replaced by numbers. `words` contains, for each column, a mapping from strings to numbers, to which
+    new strings are added.
     """
     texts = line.split(",")
     if len(texts) != len(varied):

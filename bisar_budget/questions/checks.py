@@ -123,7 +123,7 @@ def checked(
     model, changes, outside
         As in `check_files`.
     drawn : Draws, optional
-        Number of draws and seed of a Monte Carlo; None if none is requested.
+        Number of draws and seed of a Monte Carlo simulation; by default there is no simulation.
     is_verified : bool
         Whether to form images with errors at the limits, and add their verdicts.
     swept : sequence of str
@@ -305,7 +305,7 @@ def gathered(
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
     """Find specifications for the errors of each mission whose file has `allocation.specify`, and add them.
 
-    If no specifications can be found, the mission gets a warning that says why.
+    If no specifications can be found for a mission, it gets a warning that states the reason.
     """
     return [
         _with_sheet(findings, model, today) if isinstance(findings, MissionFindings) else findings

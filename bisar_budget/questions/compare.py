@@ -1,4 +1,4 @@
-"""Comparison of the sensors and oscillators of the catalogue by the verdict that a mission has with each of them."""
+"""Comparison of catalogue parts (sensors and oscillators) by the verdict on a mission that uses each of them."""
 
 import json
 import math
@@ -33,7 +33,7 @@ _PART_KINDS_BY_SECTION: Mapping[str, tuple[str, ...]] = {
 
 
 def is_sensor_key(key: str) -> bool:
-    """Whether the values of a key are names of catalogue parts, so that `solve` compares parts for this key."""
+    """Whether a key takes the names of catalogue parts as values, so that `solve` compares parts for this key."""
     return key in {f"platforms.{name}.{section}.sensor" for name in PLATFORMS for section in _PART_KINDS_BY_SECTION}
 
 
@@ -95,7 +95,7 @@ def compare_parts(mission: Mission, question: Question, progress: Progress) -> C
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
     """Yield the states with `silent_on` filled in.
 
-    `silent_on` lists the figures that other parts of the same kind state and this part does not.
+    `silent_on` lists the figures that other parts of the same kind state but this part does not.
     """
     for state in states:
         if state.standing.status == "error":
@@ -112,8 +112,8 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 def _order(state: PartState) -> tuple[int, float, float, str]:
     """Return the sort key of a part: complying parts come first, then waived parts, then all other parts.
 
-    Complying parts are sorted by ascending margin, all other parts by ascending excess. Within each group, parts
-    without a utilization, such as parts with which the mission is invalid, come last.
+    Complying parts are sorted by ascending margin, and all other parts by ascending excess. Within each group, parts
+    without a utilization, for example because the mission is invalid with them, come last.
     """
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
@@ -124,10 +124,10 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
 
 
 class _Candidate(NamedTuple):
-    """A part of the catalogue to try, with the judged mission.
+    """A part of the catalogue to try, and the judged mission with this part.
 
-    If the mission is invalid with this part, `judged` is None and `reason` is set. `figures` are the figures that the
-    mission takes from the part. `stated` are the figures for which the mission file overrides the part.
+    If the mission is invalid with the part, `judged` is None and `reason` is set. `figures` are the figures that the
+    mission takes from the part. `stated` are figures of the part that are overridden by the mission file.
     """
 
     id: str
@@ -140,7 +140,7 @@ class _Candidate(NamedTuple):
 
 
 class _PartSearch:
-    """Checks a mission with each of the parts that a key can name.
+    """Search over the parts that a key can name; the mission is checked with each of them.
 
     `given` are the parts that the mission file names, and `candidates` are all parts to try. The constructor raises
     `PartError` if the catalogue cannot be read.
@@ -167,9 +167,9 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Return the value of the key, as text, with the part `name` as the only part of the kind `kind`.
+        """Return the value of the key that names the part `name` as the only part of the kind `kind`.
 
-        Parts of other kinds that the file names are kept.
+        Parts of other kinds that the mission file names are kept. The value is a string as in a mission file.
         """
         kept = [named for named, device in self.given.items() if device.kind != kind]
         return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
@@ -236,5 +236,5 @@ class _PartSearch:
 
 
 def mission_with(variation: Variation, key: str, state: PartState) -> Mission:
-    """Read the mission with the part of `state`, one of the compared parts, as the value of the key."""
+    """Read the mission with one of the compared parts, given by `state`, as the value of the key."""
     return variation.read([SetValue(key, _PartSearch(variation, key).value(state.id, state.kind))])

@@ -45,7 +45,7 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
 
 
 def drawn_here(draws: int, seed: int | None) -> Draws:
-    """Make the settings of a Monte Carlo that runs in this process and shows a progress bar."""
+    """Make the settings of a Monte Carlo simulation that runs in this process and shows a progress bar."""
     from bisar_budget.sampling.draws import in_turn
 
     return Draws(draws, seed, partial(_watched, in_turn, None))
@@ -55,10 +55,11 @@ def drawn_here(draws: int, seed: int | None) -> Draws:
 def drawn_by(
     scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
 ) -> "Iterator[Draws | None]":
-    """Context manager that yields the settings of a Monte Carlo; None if `draws`, the number of draws, is None.
+    """Context manager that yields the settings of a Monte Carlo simulation, or None if `draws` is None.
 
-    The workers of `scheduler` compute the draws; if it is None, this machine computes them. `patience` is the maximum
-    time to wait for a worker of the scheduler [s]. `files` is the number of mission files of the command.
+    `draws` is the number of draws, and `seed` is the seed of the random numbers. The workers of `scheduler` compute
+    the draws; if it is None, this machine computes them. `patience` is the maximum time to wait for a worker of the
+    scheduler [s]. `files` is the number of mission files of the command.
     """
     if draws is None:
         yield None

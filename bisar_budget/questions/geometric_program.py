@@ -1,9 +1,10 @@
-"""Find the largest sizes for which sums of their powers stay within limits: a geometric program.
+"""Search for the largest sizes for which sums of their powers stay within limits: a geometric program.
 
-Let x be the logarithms of the sizes. The constraint Σ aᵢ·e^(p·xᵢ) ≤ room of each row is convex, and the objective
-Σ wᵢ·xᵢ is linear, so there is one maximum. It is found by a barrier method: a barrier keeps the sizes within the
-constraints, and Newton's method follows the maximum while the barrier is weakened step by step. The formulas are
-derived here; the method is in Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
+Let x be the logarithms of the sizes. The constraint of each row, Σ aᵢ·e^(p·xᵢ) ≤ room, is convex, and the objective Σ
+wᵢ·xᵢ is linear, so there is one maximum. It is found by a barrier method: a barrier keeps the sizes within the
+constraints, and Newton's method follows the maximum while the barrier is weakened step by step. The method is
+described in Boyd & Vandenberghe, Convex Optimization, Sections 4.5 and 11.3; its formulas for this problem are
+derived here.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ class BarrierSettings:
     Attributes
     ----------
     gap_fraction : float
-        Largest allowed distance between Σ w·x and its maximum, as a fraction of Σ w.
+        Largest allowed difference between Σ w·x and its maximum, as a fraction of Σ w.
     firmness_factor : float
         Factor by which the weight of the objective relative to the barrier grows in each round.
     max_newton_steps : int
@@ -42,7 +43,8 @@ _BARRIER = BarrierSettings()
 class Rows(NamedTuple):
     """Constraints Σ aᵢ·sᵢ^p ≤ room on sizes s, one for each row.
 
-    `share` are the coefficients a, (rows, sizes). `power` are the powers p, and `room` the right-hand sides, (rows,).
+    `share` are the coefficients a, (rows, sizes). `power` are the exponents p, (rows,). `room` are the right-hand
+    sides, (rows,).
     """
 
     share: Floats
@@ -50,24 +52,28 @@ class Rows(NamedTuple):
     room: Floats
 
     def at(self, x: Floats) -> Floats:
-        """Compute the fraction of each row's room that each size takes up, (rows, sizes); the sizes are e^x."""
+        """Compute the fraction of each row's right-hand side that each size takes up, (rows, sizes).
+
+        The sizes are e^x. The right-hand side of a row's constraint is its `room`.
+        """
         fractions: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
         return fractions
 
     def with_rows(self, further: "Rows") -> "Rows":
-        """Make new constraints: the rows of these constraints, followed by the rows of `further`."""
+        """Make new constraints that consist of the rows of these constraints, followed by the rows of `further`."""
         return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
     def of_sizes(self, chosen: Booleans) -> "Rows":
-        """Make new constraints with the columns of the chosen sizes only; `chosen` is (sizes,)."""
+        """Make new constraints that contain only the columns of the chosen sizes; `chosen` is a mask (sizes,)."""
         return self._replace(share=self.share[:, chosen])
 
 
 class Largest(NamedTuple):
-    """Solution of a geometric program: logarithms of the largest sizes, and the multiplier of each row.
+    """Solution of a geometric program: logarithms of the largest sizes, and a multiplier for each row.
 
-    The multipliers satisfy Σⱼ multiplierⱼ·partⱼᵢ = weightᵢ, where partⱼᵢ is the fraction of the room of row j that
-    size i takes.
+    A row is a constraint on the sizes (see `Rows`). The multipliers satisfy Σⱼ multiplierⱼ·partⱼᵢ = weightᵢ. Here
+    weightᵢ is the weight of size i in the objective Σ wᵢ·log sᵢ, and partⱼᵢ is the fraction of the right-hand side of
+    row j that size i takes up.
     """
 
     log: Floats
@@ -75,14 +81,15 @@ class Largest(NamedTuple):
 
 
 def largest_sizes(weights: Floats, rows: Rows) -> Largest:
-    """Find the sizes sᵢ that maximise Σ wᵢ·log sᵢ while no row exceeds its room.
+    """Find the sizes sᵢ that maximise Σ wᵢ·log sᵢ while every constraint of `rows` holds.
 
     Parameters
     ----------
     weights : (sizes,)
-        Weights wᵢ, all above 0.
+        Weights wᵢ, all of which are positive.
     rows : Rows
-        Constraints. The room of each row is above 0, and each size has a coefficient above 0 in at least one row.
+        Constraints. The right-hand side (`room`) of each row is positive, and each size has a positive coefficient in
+        at least one row.
     """
     with np.errstate(divide="ignore"):
         alone = (np.log(rows.room[:, None] / rows.share) - np.log(2 * weights.size)) / rows.power[:, None]
@@ -110,8 +117,9 @@ def largest_sizes(weights: Floats, rows: Rows) -> Largest:
 def _towards(x: Floats, step: Floats, gradient: Floats, pull: Floats, rows: Rows) -> Floats:
     """Take a Newton step, and return the new logarithms of the sizes, (sizes,).
 
-    The step is halved until the objective with the barrier falls enough and no row exceeds its room. `pull` are the
-    weights of the objective relative to the barrier, (sizes,).
+    The step is halved until the function to minimise, which is the negative objective plus the barrier, falls enough
+    and no row exceeds its right-hand side (`room`). `pull` are the weights of the objective relative to the barrier,
+    (sizes,).
     """
     before, falls = _value(x, pull, rows), float(gradient @ step)
     length = min(1.0, 2.0 / float(np.abs(step).max()))

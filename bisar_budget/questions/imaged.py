@@ -1,6 +1,6 @@
-"""Images of the mission at the solution of a design question.
+"""Simulated images of the mission at the solution of a design question.
 
-They show whether the limit of the binding row is correct.
+The images show whether the limit of the row that decides the solution is correct.
 """
 
 from glob import escape
@@ -17,7 +17,10 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """Data for forming images at a solution: the mission there, the binding row, and the solution as text."""
+    """Data for forming images at the solution of a design question.
+
+    `mission` is the mission at the solution, `row` is the binding row, and `at` is the solution as text.
+    """
 
     mission: Mission
     row: str
@@ -30,11 +33,12 @@ class ToImage(NamedTuple):
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
-    """Choose the mission and the row for images at a solution.
+    """Choose the mission and the row for which images are formed at a solution.
 
-    Returns None if no value complies, if all values comply, or if no row binds. The mission is taken at the complying
-    side of the crossing with the largest value. For a comparison it is the mission with the complying part that has
-    the smallest margin.
+    The solution is a number with crossings at which the mission begins or ceases to comply, or a comparison of parts.
+    For a number, the mission is taken at the complying side of the crossing with the largest value. For a comparison,
+    it has the complying part with the smallest margin. Returns None if no value complies, if all values comply, or if
+    no row binds.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

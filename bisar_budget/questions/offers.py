@@ -16,10 +16,10 @@ _OSCILLATOR_KEYS = ("frequency", "phase_noise", "power_law", "allan_deviation", 
 def compared_offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Compare the mission of an offer with a sheet of specifications.
 
-    A figure meets its specification if it is no larger than the specified size. If a figure has three axes, the
-    largest value counts. Figures of parts that the offer names are compared in the same way. A level shifts a
-    spectrum, so levels of different spectra cannot be compared. Specifications and waivers in the file of the offer
-    are ignored.
+    A figure meets its specification if it is no larger than the specified size. If a figure has values for three
+    axes, the largest of them counts. Figures of parts that the offer names are compared in the same way. A level in
+    decibels shifts a spectrum, so levels of different spectra cannot be compared. Specifications and waivers in the
+    file of the offer are ignored.
     """
     sheet_mission = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(each, sheet, mission, sheet_mission) for each in sheet.specifications)
@@ -48,9 +48,9 @@ def _figure(
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
-    """Find the noise or vibration spectrum that a level shifts, before the shift.
+    """Find the noise or vibration spectrum that a level in decibels shifts, in its form before the shift.
 
-    `parts` are the parts of the key of the level. Spectra are returned in a form that can be compared.
+    `parts` are the components of the key of the level. The result can be tested for equality with another spectrum.
     """
     platform = getattr(mission.platforms, parts[1])
     if parts[-1] == "level":
@@ -59,9 +59,9 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """Return the allocation rules of a mission in the form used in a specification sheet.
+    """Return the allocation rules of a mission in the form that a specification sheet uses.
 
-    The returned rules have no `specify`, and equal shares in place of balanced shares.
+    In this form `specify` is empty, and balanced shares are replaced by equal shares.
     """
     split = mission.allocation.split
     if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":

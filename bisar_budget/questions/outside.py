@@ -20,7 +20,7 @@ def day_of(date: str | dt.date | None) -> dt.date:
     Raises
     ------
     ValueError
-        `date` is not a day, or the environment variable SOURCE_DATE_EPOCH is not a time in seconds since 1970.
+        `date` is not a valid date, or the environment variable SOURCE_DATE_EPOCH is not a time in seconds since 1970.
     """
     if isinstance(date, dt.datetime):
         return date.date()
@@ -43,7 +43,8 @@ def day_of(date: str | dt.date | None) -> dt.date:
 def day_origin(day: str | dt.date | None, giver: str) -> str:
     """Describe, for reports, where the day on which waivers are judged comes from.
 
-    This is `giver` if `day` is not None, or else the variable SOURCE_DATE_EPOCH, or else the day of the run.
+    The result is `giver` if `day` is not None, or else the environment variable SOURCE_DATE_EPOCH, or else the day of
+    the run.
     """
     if day is not None:
         return giver
@@ -62,7 +63,7 @@ def outside_of(model: str | None, day: str | dt.date | None) -> Outside:
 def influences_of(
     mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
 ) -> tuple[dt.date, tuple[Override, ...]]:
-    """Find the day on which waivers are judged, and list the influences on the verdict from outside the mission file.
+    """Find the day on which waivers are judged, and list influences on the verdict that are not in the file.
 
     Raises `QuestionError` for an unknown model.
     """

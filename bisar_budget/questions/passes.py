@@ -2,8 +2,8 @@
 
 A pass lasts as long as the satellite is above a minimum elevation; if both platforms have orbits, both satellites
 must be above it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by
-default at broadside. The mission is checked with mid-aperture at the mid-time, as if its file stated this
-`collection.center_time`.
+default at broadside. The mission is checked with the middle of the aperture at the mid-time, as if its file stated
+this time as `collection.center_time`.
 """
 
 import datetime as dt
@@ -53,7 +53,7 @@ def start_of(text: str) -> Instant:
     Raises
     ------
     QuestionError
-        The text is neither a date nor an instant, or the year is out of range.
+        The string is neither a date nor an instant, or the year is out of range.
     """
     instant = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
     if instant is None or not _YEARS[0] <= instant.as_datetime().year < _YEARS[1]:
@@ -76,21 +76,21 @@ def passes(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> PassesResult:
-    """List the passes of a satellite over the scene, with the verdict of the mission in each.
+    """List the passes of a satellite over the scene, with the verdict of the mission in each pass.
 
     Parameters
     ----------
     mission : Mission or path
         A mission with an orbit. A file needs no `collection.center_time`.
     start : str or date, optional
-        First day (UTC), or an instant such as `2026-07-01T05:30:00Z`; by default the day of the check.
+        First day (UTC), or a time such as `2026-07-01T05:30:00Z`; by default the day of the check.
     days : float
         Length of the period that is searched for passes. [d]
     min_elevation, squint : str, float or quantity
         Minimum elevation of the satellite as seen from the scene, and squint angle at the mid-time of the aperture.
         Each is a string with a unit, or a number in radians.
     platform : str, optional
-        Which platform is the satellite, `transmitter` or `receiver`; by default the first platform with an orbit.
+        Platform that is the satellite, `transmitter` or `receiver`; by default the first platform with an orbit.
     model, date, outside
         As in `check`.
 
@@ -160,7 +160,10 @@ def angle_of(option: str, value: object, least: float) -> float:
 
 
 def _listed(mission: Mission, platform: str | None) -> str:
-    """Name of the platform whose passes are listed: the requested one, or else the first with an orbit."""
+    """Name of the platform whose passes are listed.
+
+    It is the requested platform, or else the first platform with an orbit.
+    """
     flying = [name for name in PLATFORMS if getattr(mission.platforms, name).orbit is not None]
     if not flying:
         accepted = "accepted: platforms.transmitter.orbit or platforms.receiver.orbit"
@@ -173,10 +176,10 @@ def _listed(mission: Mission, platform: str | None) -> str:
 def _watched(
     mission: Mission, axes: SceneAxes, start: Instant, days: float, variation: Variation
 ) -> dict[str, Watched]:
-    """Compute the motion of each satellite as seen from the scene, by the name of the platform.
+    """Compute the motion of each satellite as seen from the scene, keyed by the name of the platform.
 
-    If the orbit of a platform is not usable at any time of the span, the function raises the error with which a check
-    at the beginning of the span would fail.
+    If the orbit of a platform cannot be used at any time of the span, the function raises the same error as a check
+    at the beginning of the span.
     """
     read = reader_of(folder_of(mission.file))
     seen = {}
@@ -195,9 +198,9 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Raise the error of an unusable orbit, if there is one, by reading the mission with mid-aperture at an instant.
+    """Read the mission with mid-aperture at the instant `start`, and raise the error that an unusable orbit causes.
 
-    Nothing is raised if the mission is valid. The message does not mention the changed instant, because the user has
+    Nothing is raised if the mission is valid. The error message does not mention the instant, because the user has
     not set it.
     """
     try:
@@ -211,9 +214,9 @@ def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) ->
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """Find the times, the track and the mid-time of a pass; its mission is checked later.
+    """Find the times, the track and the mid-time of a pass, without checking its mission.
 
-    `stretch` is the time interval of the pass. `squint` is the squint angle at the mid-time. [rad]
+    `stretch` is the time interval of the pass. `squint` [rad] is the squint angle at the mid-time.
     """
     culmination = satellite.culmination(stretch)
     times = np.linspace(stretch.start, stretch.stop, _TRACK_POINTS)
@@ -251,7 +254,8 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
 def _side(state: PlatformState, axes: SceneAxes) -> str:
     """Side of the ground track on which the scene lies, seen in the direction of flight: `left` or `right`.
 
-    The right side is along v × r, with the velocity v and the position r from the centre of the Earth.
+    The right side is in the direction v × r, where v is the velocity, and r is the position relative to the centre of
+    the Earth.
     """
     right = cross(plain_vector(state.velocity), axes.turned(axes.earth_fixed(plain_vector(state.position))))
     return "left" if dot(state.look, right) > 0 else "right"
@@ -261,7 +265,7 @@ def _side(state: PlatformState, axes: SceneAxes) -> str:
 def _checked(
     found: Sequence[SatellitePass], platform: str, variation: Variation, today: date, progress: Progress
 ) -> Iterator[SatellitePass]:
-    """Check the mission at the mid-time of each pass."""
+    """Check the mission at the mid-time of each pass, and yield the passes with their verdicts."""
     for first in range(0, len(found), _PASSES_PER_BLOCK):
         block = list(found[first : first + _PASSES_PER_BLOCK])
         missions, places = [], []
@@ -281,7 +285,7 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Make the changes to a mission file that set mid-aperture to an instant."""
+    """Make the changes to a mission file that put the middle of the aperture at an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
@@ -306,11 +310,12 @@ def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission
 
 
 def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
-    """Find the row, key and utilization of the requirement that decides, and the reason for the mission's status.
+    """Find the requirement that decides the status of a mission, and the reason for this status.
 
-    Among the requirements that have the same status as the mission, the one with the highest utilization decides. If
-    no requirement has this status, the status comes from a row or from a warning about the whole mission. The
-    utilization is None if nothing is judged.
+    Returns the row, the key and the utilization of the requirement, and the reason. Among the requirements that have
+    the same status as the mission, the requirement with the highest utilization decides. If no requirement has this
+    status, the status comes from a row or from a warning about the whole mission. The utilization is None if nothing
+    is judged.
     """
     worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
     if worst.status == findings.status:

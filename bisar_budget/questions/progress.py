@@ -29,7 +29,7 @@ _TRIAL_GROWTH_FACTOR = 3  # ratio of the sizes of two successive trials
 
 
 def _unheard(_: str) -> None:
-    """Drop a message."""
+    """Ignore a message; used in place of a function that shows it."""
 
 
 # Function that shows a message to the user who waits; a caller from Python sees only the bar.
@@ -37,7 +37,7 @@ SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=_unhear
 
 
 def is_heard() -> bool:
-    """Whether messages reach a user. If not, no time needs to be estimated for them."""
+    """Whether messages reach a user. If not, the duration of a computation need not be estimated."""
     return SAYING.get() is not _unheard
 
 
@@ -74,7 +74,7 @@ def _is_notebook() -> bool:
 
 
 def _bar(label: str, total: int, is_notebook: bool) -> "tqdm[NoReturn]":
-    """Make a progress bar of tqdm, for a notebook or a terminal."""
+    """Make a tqdm progress bar, for a notebook or a terminal."""
     has_widgets = is_notebook and find_spec("ipywidgets") is not None
     kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm
     # The monitor thread of tqdm, and its lock between processes, would not survive a fork. The class is our own, so
@@ -124,7 +124,7 @@ def foretell(seconds: float, doing: str, advice: str = "") -> None:
 
 
 def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
-    """Estimate the time to process `count` items from trials with fewer items. [s]
+    """Estimate, from trials with fewer items, the time to process `count` items. [s]
 
     `trial` processes the given number of items, and returns the elapsed time [s]. The number of items increases from
     trial to trial, from `few` up to about `most`, until a trial takes long enough to be measured.
@@ -144,7 +144,7 @@ def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> 
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
     """Context manager that connects to a Dask scheduler, and yields its workers; None if `scheduler` is None.
 
-    `scheduler` is the address of the scheduler. `patience` is the longest time to wait for a worker. [s]
+    `scheduler` is the address of the scheduler. `patience` [s] is the longest time to wait for a worker.
     """
     if scheduler is None:
         return nullcontext()

@@ -1,4 +1,4 @@
-"""Classes of the results of the Python interface, which notebooks display and which convert to data frames."""
+"""Result classes of the Python interface. Notebooks display the results, and data frames can be made from them."""
 
 import json
 import os
@@ -42,7 +42,7 @@ DataFrame = Any
 
 
 class MissingPackageError(ImportError):
-    """An optional package that a method of a result needs is not installed; the message names the package."""
+    """An optional package that a method of a result class needs is not installed; the message names the package."""
 
 
 def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataFrame:
@@ -68,14 +68,14 @@ def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataF
 
 
 def _frame_of_rows(rows: Sequence[Mapping[str, object]], library: str | None) -> DataFrame:
-    """Make a data frame from rows; the keys of the first row are the columns."""
+    """Make a data frame from rows that map column names to values; the keys of the first row are the columns."""
     return frame_of({key: [row.get(key) for row in rows] for key in (rows[0] if rows else ())}, library)
 
 
 class Picture:
-    """A drawing that notebooks show.
+    """A drawing that notebooks display.
 
-    The method `save` writes the drawing to a file. The attribute `of` is the function `draw`.
+    The method `save` writes the drawing to a file. The argument `draw` is stored as the attribute `of`.
 
     Parameters
     ----------
@@ -128,8 +128,8 @@ def write_file(path: str, content: bytes) -> None:
 class CheckResult(Mapping[str, Row]):
     """Result of `check`: a mapping of row ids to rows, in the order of the JSON report.
 
-    `findings` contains everything that reports show. `model` is the argument of `check`, and `day` is the day on
-    which waivers were judged.
+    `findings` contains everything that the reports show. `model` is the argument `model` of `check`, and `day` is the
+    date for which the waivers were judged.
     """
 
     findings: MissionFindings
@@ -149,7 +149,7 @@ class CheckResult(Mapping[str, Row]):
             raise KeyError(f"{row_id}: {unknown_id(row_id, self._rows, self.findings.file)}") from None
 
     def __iter__(self) -> Iterator[str]:
-        """Ids of the rows."""
+        """Iterate over the ids of the rows."""
         return iter(self._rows)
 
     def __len__(self) -> int:
@@ -167,7 +167,7 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def waived_by(self) -> tuple[str, ...]:
-        """Ids, as in the mission file, of the waivers that apply to rows or requirements, such as `receiver.*`."""
+        """Ids of the waivers that apply to rows or requirements, as in the mission file, such as `receiver.*`."""
         return tuple(waiver.id for waiver in self.findings.waived_by)
 
     @property
@@ -177,11 +177,11 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def requirements(self) -> Mapping[str, JudgedRequirement]:
-        """Requirements of the mission file by key, each with its status and the row that determines this status."""
+        """Requirements of the mission file by key; each has its status and the row that determines this status."""
         return {requirement.key: requirement for requirement in self.findings.requirements}
 
     def to_dict(self) -> JsonDocument:
-        """The document that `check --format json` writes, as a dictionary."""
+        """Return the document that `check --format json` writes, as a dictionary."""
         document: JsonDocument = json.loads(render("json", self._report, Style()))
         return document
 
@@ -205,12 +205,12 @@ class CheckResult(Mapping[str, Row]):
         path : path
             Path of the file. Pictures of a .md report are written to a folder next to it.
         detail : str
-            `summary`, or `full` with the annex.
+            `summary`, or `full` for a report with its annex.
 
         Raises
         ------
         ValueError
-            The suffix does not belong to a format of reports.
+            There is no report format with this suffix.
         MissingExtraError
             The format needs a package that is not installed.
         """
@@ -248,13 +248,16 @@ _NESTED = ("displacement_m", "notes", "requirement_ids")  # fields of a row that
 
 # ---------------------------------------------------------------------- answers to other questions
 class AnswerResult:
-    """Base class of results that can be written in every output format of the command `COMMAND`."""
+    """Base class of results that can be written in every output format of a command.
+
+    The class attribute `COMMAND` is the name of the command, such as `solve`.
+    """
 
     COMMAND: ClassVar[str] = ""
 
     @property
     def answers(self) -> Sequence[object]:
-        """The answer in the form that the command's module in `report.answers` accepts."""
+        """The result in the form that the command's module in `report.answers` accepts."""
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
@@ -263,12 +266,12 @@ class AnswerResult:
         return fragment(module_of(self.COMMAND).document(self.answers, Style()))
 
     def to_dict(self) -> JsonDocument:
-        """Return, as a dictionary, the document that the command of the same name writes with `--format json`."""
+        """Return the document that the corresponding command writes with `--format json`, as a dictionary."""
         document: JsonDocument = json.loads(written(self.COMMAND, "json", self.answers, Style()))
         return document
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """Return, as a data frame of pandas or polars, the lines that the command writes with `--format csv`.
+        """Return the lines that the command writes with `--format csv`, as a data frame of pandas or polars.
 
         Numbers are in SI and radians.
 
@@ -281,14 +284,14 @@ class AnswerResult:
         return frame_of({name: records.column(name) for name in records.columns}, library)
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the answer to a file; its suffix selects the format, such as .html, .md, .json, .csv, .xlsx or .txt.
+        """Write the result to a file; its suffix selects the format, such as .html, .md, .json, .csv, .xlsx or .txt.
 
         Drawings of a .md file are written to a folder next to it.
 
         Raises
         ------
         ValueError
-            The suffix does not belong to any format of the answer.
+            The command has no output format with this suffix.
         MissingExtraError
             The format needs a package that is not installed.
         """
@@ -304,12 +307,15 @@ class AnswerResult:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class _FindingsResult(AnswerResult):
-    """Base class of results that wrap the findings `found` and have all attributes of `found`."""
+    """Base class of results that wrap the findings of an analysis.
+
+    The findings are in the field `found`. All attributes of `found` are also attributes of the result.
+    """
 
     found: Any
 
     def __getattr__(self, name: str) -> Any:
-        """Return the attribute of `found` for a name that the result itself does not have."""
+        """Return the attribute `name` of `found`; called only if the result itself does not have this attribute."""
         if name.startswith("_") or name == "found":
             raise AttributeError(name)
         return getattr(self.found, name)
@@ -319,31 +325,35 @@ class _FindingsResult(AnswerResult):
 
     @property
     def answers(self) -> Sequence[object]:
-        """The findings, as a sequence of a single answer."""
+        """The findings `found` as the only entry of a list."""
         return [self.found]
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
     """Phrase with the number of waived cases and the ids of their waivers; empty if no case is waived.
 
-    `waivers` contains the ids of the waivers of each waived case. The phrase begins with a comma.
+    `waivers` contains the ids of the waivers for each waived case. The phrase begins with a comma.
     """
     ids = tuple(dict.fromkeys(waiver for case in waivers for waiver in case))
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
 
 class SolveResult(_FindingsResult):
-    """Result of `solve`: the values at which compliance begins or ends.
+    """Result of `solve`: the values of a key at which the mission begins or ceases to comply.
 
-    For a number, the result has the attributes `value` in SI, `crossings`, `status` and `nearest`. For a key that
-    names a part of the catalogue, it has `parts` with complying parts first, `complying` and `status`.
+    If the value of the key is a number, the result has the attributes `value` in SI, `crossings`, `status` and
+    `nearest`. If the key names a part of the catalogue, the attributes are `parts` (complying parts first),
+    `complying` and `status`.
     """
 
     COMMAND: ClassVar[str] = "solve"
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Text on one line with the key, the value (or whether all or no values comply), and waived values."""
+        """Text on one line with the mission, the key, the result of the search, and the number of waived cases.
+
+        The result is a value, the number of complying parts, or a note that all or no values comply.
+        """
         return f"<solve of {self.found.key} for {self.found.name!r}: {self._summary}>"
 
     @property
@@ -358,7 +368,10 @@ class SolveResult(_FindingsResult):
 
 
 class SensitivityResult(_FindingsResult):
-    """Result of `sensitivity`: `slopes` has the effect of each number on the worst utilization, largest first."""
+    """Result of `sensitivity`: the effect of each number of the mission on the worst utilization.
+
+    The attribute `slopes` lists these effects, the largest first.
+    """
 
     COMMAND: ClassVar[str] = "sensitivity"
     found: "Sensitivity"
@@ -369,7 +382,7 @@ class SensitivityResult(_FindingsResult):
         return f"<sensitivity of {self.found.name!r}: {len(self.found.slopes)} numbers, first {first}>"
 
     def plot(self) -> Picture:
-        """Draw a bar for each number, as long as its effect on the worst utilization."""
+        """Draw a bar chart; the length of each bar is the effect of one number on the worst utilization."""
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.tornado import tornado
 
@@ -380,8 +393,9 @@ class SensitivityResult(_FindingsResult):
 class AllocateResult(_FindingsResult):
     """Result of `allocate`: specifications that together meet every requirement.
 
-    The attributes `specifications`, `complies` and `requirements` are those of `found`. If `allocate` was given the
-    mission of a supplier, `offer` compares its declared errors with the specifications; otherwise `offer` is None.
+    The specification sheet `found` has the attributes `specifications`, `complies` and `requirements`, which are also
+    attributes of the result. If `allocate` was given the mission of a supplier, `offer` compares the errors declared
+    in that mission with the specifications; otherwise `offer` is None.
     """
 
     COMMAND: ClassVar[str] = "allocate"
@@ -395,18 +409,21 @@ class AllocateResult(_FindingsResult):
 
     @property
     def answers(self) -> Sequence[object]:
-        """The specification sheet and the offer, as a sequence of a single answer."""
+        """The pair of the specification sheet and the offer, as the only entry of a list."""
         return [(self.found, self.offer)]
 
 
 class VerifyResult(_FindingsResult):
-    """Result of `verify`: `rows` has the verdict of images on each limit, and `status` summarizes the verdicts."""
+    """Result of `verify`, which checks limits by means of simulated images.
+
+    The attribute `rows` has a verdict for each limit, and `status` summarizes the verdicts.
+    """
 
     COMMAND: ClassVar[str] = "verify"
     found: VerifiedMission
 
     def __repr__(self) -> str:
-        """Text on one line with the number of limits for each verdict."""
+        """Text on one line that states how many limits have each verdict."""
         counts = Counter(row.verdict for row in self.found.rows)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<verify of {self.found.name!r}: {verdicts}>"
@@ -414,7 +431,7 @@ class VerifyResult(_FindingsResult):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class PassesResult(_FindingsResult):
-    """Result of `passes`: a sequence of the passes of a satellite, each with the verdict of the mission in it.
+    """Result of `passes`: a sequence of the passes of a satellite, each with a verdict on the mission.
 
     `mission` and `model` are the arguments of the function `passes`.
     """
@@ -441,7 +458,7 @@ class PassesResult(_FindingsResult):
     def mission_text(self, satellite_pass: "SatellitePass", folder: str | os.PathLike[str]) -> str:
         """Text of a mission file in which the middle of the aperture is at the mid-time of a pass.
 
-        File names in the text are relative to `folder`, to which the mission file is to be written.
+        File names in the text are relative to `folder`, the folder for the new mission file.
         """
         from bisar_budget.mission.edited import in_folder, with_values
         from bisar_budget.questions.passes import center_time
@@ -462,10 +479,10 @@ class PassesResult(_FindingsResult):
 
 
 class MonteCarloResult(_FindingsResult):
-    """Result of `monte_carlo`: probabilities that each requirement, and all requirements together, are met.
+    """Result of `monte_carlo`: the probabilities that the requirements are met, each with a confidence interval.
 
-    `probability` is the probability that all requirements are met together, and `requirements` has an entry for each
-    requirement. Every probability has a confidence interval.
+    `probability` is the probability that all requirements are met together. `requirements` has the probability for
+    each requirement.
     """
 
     COMMAND: ClassVar[str] = "monte_carlo"
@@ -480,12 +497,15 @@ class MonteCarloResult(_FindingsResult):
         return f"<monte_carlo: {answer.draws} draws, all hold in {answer.probability:.4g} ({interval})>"
 
     def to_dict(self) -> JsonDocument:
-        """Return, as a dictionary, the Monte Carlo results as `check --monte-carlo --format json` writes them."""
+        """Return the Monte Carlo results as `check --monte-carlo --format json` writes them, as a dictionary."""
         return {key: value for key, value in super().to_dict().items() if key not in ("format", "version")}
 
 
 class SimulateResult:
-    """Result of `simulate`: `image` is the image with the declared errors; `images` also has all other images."""
+    """Result of `simulate`: images of a point, simulated with the declared errors.
+
+    `image` is the image with these errors; `images` contains this and all other simulated images.
+    """
 
     def __init__(self, images: "PointImages", mission: Mission) -> None:
         self.images, self._mission = images, mission
@@ -497,13 +517,13 @@ class SimulateResult:
 
     @property
     def image(self) -> Complexes:
-        """Complex image in the axes of the scene, (nx, ny), with x east and y north."""
+        """Complex image (nx, ny) in the axes of the scene; x is east and y is north."""
         return self.images.in_scene
 
     def plot(self, *, paper: bool = False) -> Picture:
-        """Draw the range error of this mission, its images before and after autofocus, and their cuts.
+        """Draw the range error of the mission, the images before and after autofocus, and cuts through these images.
 
-        If `paper` is True, figures and equations have the numbers of Rigling & Moses, Figures 3 to 7.
+        If `paper` is True, figures and equations are numbered as in Rigling & Moses, Figures 3 to 7.
         """
         from bisar_budget.report.drawing.point_plot import drawn
 

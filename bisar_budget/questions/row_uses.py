@@ -42,7 +42,7 @@ _HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows w
 
 
 class RowUses(NamedTuple):
-    """Utilizations of all rows that can fail, with the ids and requirements of the rows.
+    """Utilizations of all rows that can fail, and the ids and requirements of these rows.
 
     `uses` are the utilizations (rows, cases), one column for each set of sizes. `powers` are the exponents of the
     rows, (rows,): 1 if the errors of a row add linearly, 2 if their squares add.
@@ -55,7 +55,7 @@ class RowUses(NamedTuple):
 
 
 class Near(NamedTuple):
-    """Utilizations of the rows for some sizes of errors, and for neighbouring sizes.
+    """Utilizations of the rows for given sizes of the errors, and for neighbouring sizes.
 
     Attributes
     ----------
@@ -64,13 +64,14 @@ class Near(NamedTuple):
     allowed : (rows,)
         Allowed utilizations.
     sizes : (sizes,)
-        The sizes of the specified errors.
+        Given sizes of the specified errors.
     part : (rows, sizes)
-        Contribution of each error to the utilization of each row, raised to the power of the row.
+        Contribution of each error to the utilization of each row, raised to the exponent of the row.
     room : (rows,)
-        Part of the allowed utilization, raised to the power of the row, that is left for the specified errors.
+        Room for the specified errors in each row: the allowed utilization, raised to the exponent of the row, minus
+        the part that all other errors use.
     is_limit : (rows,)
-        Whether any specified error contributes to the row.
+        Whether at least one specified error contributes to the row.
     is_free : (sizes,)
         Whether the error contributes to no row.
     """
@@ -86,7 +87,7 @@ class Near(NamedTuple):
     def rows(self, of: str = "") -> Rows:
         """Make the constraints on the sizes for the geometric program.
 
-        These are all rows that limit a size, or only the row with the id `of`.
+        The constraints come from all rows that limit a size, or only from the row with the id `of`.
         """
         limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
         power = self.found.powers[limits]
@@ -99,9 +100,11 @@ class SpecifiedMission:
     Attributes
     ----------
     ends : (sizes,)
-        Sizes at and above which there is no image. An element is infinite until the search finds this size.
+        For each error, the size at and above which no image forms. An element is infinite until the search finds this
+        size.
     most : (sizes,)
-        Largest sizes that a mission file may state. An element is infinite until the search exceeds this size.
+        For each error, the largest size that a mission file may state. An element is infinite until the search
+        exceeds this size.
     unjudged : set of str
         Ids of rows that cannot be judged even without the specified errors.
     """
@@ -154,9 +157,9 @@ class SpecifiedMission:
             yield SetValue(key, "equal")
 
     def with_values(self, texts: Sequence[str]) -> Mission:
-        """Read the mission with a new size for each specified error.
+        """Read the mission with new sizes of the specified errors.
 
-        `texts` are the sizes as strings, in the order of the specified errors. An error with an empty text is not
+        `texts` are the sizes as strings, in the order of the specified errors. An error whose string is empty is not
         changed.
         """
         return self._read(
@@ -168,9 +171,10 @@ class SpecifiedMission:
         return self.variation.read([*self.equal, *changes])._replace(waivers=(), specifications={})
 
     def judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
-        """Judge the mission with the specified errors set to sizes, (sizes, cases).
+        """Judge the mission with given sizes of the specified errors, (sizes, cases).
 
-        With `is_of_sums` only the rows of combined errors are judged, otherwise the rows of single errors too.
+        If `is_of_sums` is true, only the rows of combined errors are judged, otherwise also the rows of single
+        errors.
         """
         mission = self.stated
         for error, column in zip(self.specified, sizes, strict=True):
@@ -181,7 +185,7 @@ class SpecifiedMission:
 
     @cached_property
     def _nodes(self) -> int:
-        """Number of times in the aperture at which exact ranges are computed, to fit a polynomial to them."""
+        """Number of instants in the aperture at which exact ranges are computed for the fit of a polynomial."""
         return int(exact_ranges(self.stated, self.stated.geometry).fit.shape[1])
 
     def uses(self, sizes: Floats) -> RowUses:
@@ -220,25 +224,26 @@ class SpecifiedMission:
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: ErrorKind) -> float:
-        """Exponent of rows of a kind: 1 if the errors add linearly, 2 if their squares add."""
+        """Exponent of the rows of one kind: 1 if the errors in a row add linearly, 2 if their squares add."""
         is_summed = self.combine == "sum" and kind.is_by_rule
         return 1.0 if is_summed or kind.only_warns else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
-        """Compute the allowed utilizations of rows, (rows,): 1 minus the reserve, reduced by a small margin.
+        """Compute the allowed utilizations of rows, (rows,).
 
-        Rows without a requirement have no reserve. A row for the largest size at which an image forms has a margin of
-        at least 0.5 %.
+        The allowed utilization is 1 minus the reserve, reduced by a small margin. Rows without a requirement have no
+        reserve. The exception is a row for the largest size at which an image forms: it has the reserve, and its
+        margin is at least 0.5 %.
         """
         usual = (1 - self.reserve) * _SURE_FRACTION
         most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), LARGEST_ACCEPTED: _SURE_FRACTION}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     def near(self, sizes: Floats) -> Near | None:
-        """Compute the utilizations of all rows at sizes (sizes,), and with each size alone 20 % smaller and larger.
+        """Compute the utilizations of all rows at given sizes of the errors, (sizes,), and at neighbouring sizes.
 
-        Returns None if a utilization exceeds three times the allowed one, or if a row has no room for the specified
-        errors.
+        For the neighbouring sizes, each size alone is reduced and increased by 20 %. Returns None if a utilization
+        exceeds three times the allowed value, or if a row has no room for the specified errors.
         """
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)

@@ -1,8 +1,8 @@
 """Sensitivity of the worst utilization to each number of a mission, from differences between full checks.
 
-Each number that the file states, or takes from a part, is changed alone, and all cases are checked together. If the
-shares of the budget are balanced by the declared errors, each error is also doubled, to show how much the allowables
-of the other errors shrink. Values are in SI and radians.
+Each number that the file states, or takes from a catalogue part, is changed alone, and all cases are checked
+together. If the shares of the budget are balanced, that is in proportion to the declared errors, each error is also
+doubled, to show how much the allowables of the other errors shrink. Values are in SI and radians.
 """
 
 import datetime as dt
@@ -68,13 +68,13 @@ _EARTH_RADIUS_M = 6.371e6  # mean radius
 
 # ---------------------------------------------------------------- differences
 class Stated(NamedTuple):
-    """A number of the mission file that the analysis varies; `text` is the number as written in the file.
+    """A number of the mission file that the sensitivity analysis varies; `text` is the number as written in the file.
 
     A central difference extends from `step` below the value to `step` above it. `per` is the increase for which
     effects are given, in SI, and `per_text` is the same increase as text. `part` is this increase as a dimensionless
-    ratio, with the same references as `Slope.measure`. `others` are further numbers that change with this one: the
-    other shares of its section, because all shares sum to 1. For a covariance the value is a factor by which all
-    sigmas are multiplied.
+    ratio, with the same references as `Slope.measure`. `others` are further numbers that change with this number. For
+    a share of a budget they are all remaining shares, because the shares sum to 1. For a covariance the value is a
+    factor by which all sigmas are multiplied.
     """
 
     number: Number
@@ -168,11 +168,11 @@ def sensitivity(
 
 
 class _Uses(NamedTuple):
-    """Utilizations of a mission in one case.
+    """Utilizations of a mission in one case, in which one of its numbers may be changed.
 
-    `worst_row` is the row with the worst utilization `worst`, and `requirement` sets its limit. `row` is the
-    utilization of the requested row, or None. `of_worst` is the utilization, in this case, of the row that is the
-    worst with the numbers of the file.
+    `worst` is the worst utilization of all rows. It is the utilization of the row `worst_row`, whose limit is set by
+    `requirement`. `row` is the utilization of the requested row; None if no row is requested. `of_worst` is the
+    utilization, in this case, of the row that is worst with the unchanged numbers of the file.
     """
 
     worst_row: str
@@ -183,7 +183,7 @@ class _Uses(NamedTuple):
 
     @property
     def is_passed(self) -> bool:
-        """Whether the row that is worst with the numbers of the file is no longer the worst row.
+        """Whether another row is now worse than the row that is worst with the unchanged numbers of the file.
 
         Rounding differences are ignored.
         """
@@ -191,7 +191,7 @@ class _Uses(NamedTuple):
 
 
 class _Neighbours:
-    """Checks of a mission in which one number is changed by one or two steps, to compute slopes from them."""
+    """Checks of a mission with one number changed by one or two steps, and the slopes that follow from them."""
 
     def __init__(
         self, variation: Variation, numbers: Sequence[Stated], worst: str | None, row: str | None, today: date
@@ -231,10 +231,10 @@ class _Neighbours:
         return uses
 
     def slopes(self, here: _Uses, progress: Progress) -> Iterator[Slope | Skipped]:
-        """Yield the slope of each number, from a central difference if possible.
+        """Yield the slope of the utilization for each number, from a central difference if possible.
 
         If the mission is invalid on one side of the value, the difference is one-sided. `here` are the utilizations
-        with the numbers of the file.
+        with the unchanged numbers of the file.
         """
         sides = [(number, side) for number in self.numbers for side in (-1, 1)]
         checked = iter(self.uses(sides, progress) if sides else ())
@@ -262,9 +262,10 @@ class _Neighbours:
     def _slope(
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
-        """Compute the slope of a number: a weighted sum of the utilizations `uses` at ascending values of the number.
+        """Compute the slope of the utilization with respect to a number, as a weighted sum of utilizations.
 
-        `kind` is the kind of difference: `central`, `forward` or `backward`.
+        `uses` are the utilizations at ascending values of the number, and `here` are the utilizations with the
+        unchanged numbers of the file. `kind` is the kind of difference: `central`, `forward` or `backward`.
         """
 
         def change(values: Iterator[float]) -> float:
@@ -290,10 +291,10 @@ class _Neighbours:
 
 # ---------------------------------------------------------------- numbers of the file
 def stated_numbers(tree: JsonObject, nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
-    """Find all numbers of a mission file that can be varied, in the order of the file, and the skipped keys.
+    """Find all numbers of a mission file that can be varied, and the keys that are skipped.
 
-    `tree` is the content of the file, as strings, lists and mappings. A latitude or longitude changes by a fraction
-    of `nearest_m`, the slant range of the nearer platform. [m]
+    Both are in the order of the file. `tree` is the content of the file, as strings, lists and mappings. A latitude
+    or longitude is changed by a fraction of `nearest_m` [m], the slant range of the nearer platform.
     """
     numbers: list[Stated] = []
     skipped: list[Skipped] = []
@@ -315,9 +316,10 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
-    """Yield every leaf of the tree of a mission file: its key, its reader, its value, and the shares of its section.
+    """Yield the key, the reader and the value of every leaf of the tree of a mission file, and its shares.
 
-    The shares are None if the leaf is not a share itself.
+    If the leaf is the share of a budget, its shares are all shares in the same section, its own included. For any
+    other leaf they are None.
     """
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
@@ -339,7 +341,7 @@ def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above:
 def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, object] | None) -> Stated | Skipped:
     """Choose the step by which a number is varied, or return the reason why the number cannot be varied.
 
-    `shares` are all shares of the section of the number; None if the number is not a share.
+    `shares` holds all shares in the same section of the file as the number; it is None if the number is not a share.
     """
     value = number.value or 0.0
     if number.reader is LATITUDE or number.key.endswith("longitude"):
@@ -366,7 +368,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, ob
 
 
 def _no_number(key: str, reader: Reader[object]) -> str:
-    """Explain why the value of a key is not varied.
+    """Explain why the value at a key of the mission file is not varied.
 
     The result is empty for names and remarks, which have no effect on the verdict.
     """
@@ -382,7 +384,10 @@ def _no_number(key: str, reader: Reader[object]) -> str:
 
 # ---------------------------------------------------------------- shares that follow the declared errors
 def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iterator[Relaxed]:
-    """Yield the effect of doubling each declared error; `judged` is the judged mission without doubled errors."""
+    """Yield the effect of doubling each declared error.
+
+    `judged` is the judged mission with the errors as declared.
+    """
     for key in _declared_errors(mission):
         try:
             doubled = scaled(mission, key, _RELAXED_FACTOR)
@@ -399,7 +404,7 @@ def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iter
 
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
-    """Yield the keys of the declared errors of all platforms and sections, including figures of catalogue parts."""
+    """Yield the key of every declared error of a mission, including errors whose values come from catalogue parts."""
     sections: list[tuple[str, object, Sequence[str], int]] = []  # key, section, its keys, and the length of a list
     for name in PLATFORMS:
         error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
@@ -424,15 +429,17 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
 
 
 def _shares(judged: JudgedMission) -> tuple[float, float]:
-    """Shares of transmitter and receiver in the requirement on the quadratic phase error."""
+    """Return the shares of the quadratic-phase requirement that are allotted to transmitter and receiver."""
     split = judged.analysis.allocation.qpe
     return split.transmitter, split.receiver
 
 
 def _of_others(owner: str, before: Sequence[Judged], after: Sequence[Judged]) -> tuple[str, float, float] | None:
-    """Find the worst row of a platform after an error is doubled, and the worst utilization before and after.
+    """Find the worst row of a platform after an error is doubled, and the highest utilization before and after.
 
-    Only judged rows whose own error is unchanged are included. Returns None if there is no such row.
+    Returns the id of the worst row, the highest utilization of the platform before the doubling, and the highest
+    utilization after it. Only judged rows whose own error is unchanged are included. Returns None if there is no such
+    row.
     """
     now, kept = {row.subject.id: row for row in after}, []
     for row in before:

@@ -1,8 +1,8 @@
 """Search for every value of one number of a mission at which compliance begins or ends.
 
-The search samples the range. Between two samples with different compliance it brackets the border. If the worst
-utilization has a maximum or minimum between samples, the search finds it first, because compliance may change and
-change back near it. Each step of the search checks many values at once with the module `table`. Values are in SI and
+The search samples the range. If only one of two neighbouring samples complies, it brackets the border between them.
+If the worst utilization has a maximum or minimum between samples, the search finds it first, because compliance may
+change twice near it. Each step of the search checks many values at once with the module `table`. Values are in SI and
 radians; factors are plain numbers.
 """
 
@@ -66,11 +66,11 @@ class SolveSettings:
     ----------
     range_samples, circle_samples : int
         Number of samples of a range, and of a full circle of directions. A circle has a sample every 2 degrees,
-        because geometry changes fast near parallel gradients.
+        because the geometry changes quickly where the range and Doppler gradients are nearly parallel.
     border_fraction : float
         Largest distance between the values on the two sides of a border before rounding, as a fraction of the value.
     max_turns_count : int
-        Largest number of maxima and minima of the utilization that are searched.
+        Limit on the number of maxima and minima of the utilization that are searched.
     turn_steps : int
         Number of steps of a golden-section search; the last interval is 7e-5 of the distance between samples.
     ahead_steps, read_ahead_steps : int
@@ -117,8 +117,8 @@ def solve(
         Path of the number, such as `collection.aperture_time`. For keys such as
         `platforms.receiver.motion_error.sensor`, every part of the catalogue is tried.
     between : pair, optional
-        Range of the search, such as `("0.2 s", "20 s")`. The default is a tenth to ten times the value of the file,
-        and the full circle for an azimuth.
+        Range of the search, such as `("0.2 s", "20 s")`. The default is from a tenth of the value in the file to ten
+        times this value, and the full circle for an azimuth.
     scale : bool
         Whether to solve for a factor that multiplies all errors of a section; `key` is then the path of the section.
     row : str, optional
@@ -126,14 +126,15 @@ def solve(
     target : str
         With `fail`, a mission complies if nothing fails. With `warn`, it must have no warnings either.
     verify : bool
-        Whether to form images at the solution, to verify the binding row, and add their verdict.
+        Whether to verify the binding row with images at the solution, and add their verdict.
     model, date, outside
         As in `check`.
 
     Raises
     ------
     QuestionError
-        The question cannot be answered for this mission, such as for an unknown key; the message says why.
+        The question cannot be answered for this mission, for example because the key is unknown; the message says
+        why.
     """
     today, influences = influences_of(mission, model, date, outside)
     if target not in TARGETS:
@@ -166,7 +167,7 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
 
 
 def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """Form images at the solution to verify the binding row, and return the solution with their verdict.
+    """Form images at the solution to verify the binding row, and return the solution with the verdict of the images.
 
     If there is no row to image, the solution is returned unchanged.
     """
@@ -182,10 +183,10 @@ def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | No
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """Find the state with the smallest margin if all states comply, otherwise the one with the smallest excess.
+    """Find the state with the smallest margin if all states comply, otherwise the state with the smallest excess.
 
-    Of several such states the first one is returned. If some states are waived, only these are considered. A state
-    that is not evaluated exceeds no limit, so its excess is taken as the smallest.
+    If several states are equally close, the first of them is returned. If some states are waived, only these are
+    considered. A state that is not evaluated exceeds no limit, so its excess is taken as the smallest.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
@@ -223,9 +224,9 @@ class _Search:
         self.range: Range = range_of(self.number, between)
 
         def judged() -> Iterator[JudgedMission]:
-            """Judge the mission of the file, and the mission at the upper end of the range.
+            """Judge the mission with the number as in the file, and with the number at the upper end of the range.
 
-            The second one is needed because the file may not declare the error.
+            The second case is needed because the error may not be declared at the value in the file.
             """
             yield judged_mission(Analysis(self.base), question.today)
             with suppress(MissionError):
@@ -277,7 +278,8 @@ class _Search:
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
         """Find the states at the samples, and at maxima and minima of the utilization where compliance changes.
 
-        Returns these states in ascending order, and the state at the value of the file, or None without such a value.
+        Returns these states in ascending order of the number, and the state at the value in the mission file, which
+        is None if the file has no such value.
         """
         values = self.range.places(
             SOLVE_SETTINGS.circle_samples if self.range.is_circle else SOLVE_SETTINGS.range_samples
@@ -323,7 +325,7 @@ class _Search:
         return states
 
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
-        """Find the crossing at each border: bracket it, round both sides to few digits, and check the rounded values.
+        """Find the crossing at each border: bracket it, round both sides to a few digits, and check the result.
 
         A border is a pair of neighbouring states with different compliance.
         """
@@ -338,7 +340,7 @@ class _Search:
         return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
     def _searched(self, searches: Sequence[Search[SearchT]]) -> list[SearchT]:
-        """Run several searches together to their ends, and return their results.
+        """Run several searches in parallel until all are finished, and return their results.
 
         The values that any of the searches needs next are checked all at once.
         """
@@ -367,7 +369,8 @@ def _bracketed(
     """Bisect the interval between two states with different compliance until it is narrow.
 
     Returns the states at both ends of the interval. If a state is missing in `states_by_value`, the function returns
-    the set of values that the next `levels` steps may need. `least` limits the width for values near 0.
+    the set of values that the next `levels` steps may need. The interval is narrow if its width is a small fraction
+    of its values; if the values are smaller than `least`, the width is compared with `least` instead.
     """
     while high.value - low.value > SOLVE_SETTINGS.border_fraction * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
@@ -401,9 +404,10 @@ def _golden(low: float, high: float) -> tuple[float, float]:
 
 
 def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
-    """Find intervals between samples in which the utilization has a maximum or minimum and compliance is constant.
+    """Find intervals in which compliance is constant, but the utilization has a maximum or minimum.
 
-    Each item has the low and high value of the interval, and the state at the sample between them.
+    Each interval extends from one sample to the next but one. Each item has the low and high value of the interval,
+    and the state at the sample between them.
     """
     turns = []
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
@@ -422,8 +426,8 @@ def _turn(
 ) -> State | set[float] | None:
     """Search near a maximum or minimum of the utilization for a state whose compliance differs from `here`.
 
-    Returns the state, or None if the search finds none. If a state is missing in `states_by_value`, the function
-    returns the set of values that the next `levels` steps may need.
+    Returns the state, or None if the search finds no such state. If a state is missing in `states_by_value`, the
+    function returns the set of values that the next `levels` steps may need.
     """
     for _ in range(SOLVE_SETTINGS.turn_steps):
         values = _golden(low, high)
@@ -456,5 +460,5 @@ def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
 
 
 def _sign(state: State) -> float:
-    """Sign of the change of the utilization that would change compliance: 1 if the state complies, otherwise -1."""
+    """Whether a higher (1) or a lower (-1) utilization would change compliance; 1 if the state complies."""
     return 1.0 if state.complies else -1.0

@@ -61,14 +61,17 @@ _DENSITY_ROUNDING_FACTOR = 1 + 1e-9
 
 
 class Specified(NamedTuple):
-    """An error for which a specification is wanted: its number in the mission file, and its weight."""
+    """An error for which a specification is wanted: its number in the mission file, and its weight.
+
+    The weight determines how much of the limits the error may use, compared with the other errors.
+    """
 
     number: Number
     weight: float
 
     @property
     def key(self) -> str:
-        """Path of the number in the mission file."""
+        """Key of the number in the mission file, as a path such as `platforms.receiver.oscillator.level`."""
         return self.number.key
 
     @property
@@ -84,7 +87,7 @@ class Specified(NamedTuple):
 
     @property
     def tiny(self) -> float:
-        """Size in SI that is so small that all effects of the error are proportional to it."""
+        """Size of the error in SI, chosen so small that all effects of the error are proportional to its size."""
         return _TINY_BY_DIMENSION.get(self.number.dimension, _TINY_SIZE)
 
     def numbers(self, sizes: Floats) -> Floats:
@@ -96,11 +99,11 @@ class Specified(NamedTuple):
         return levels
 
     def text(self, size: float) -> str:
-        """Write a size as text for a mission file, in the SI unit, or in dB for a level."""
+        """Write a size as text for a mission file, in the SI unit, or in dB if the size is a level."""
         return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
-        """Choose the unit in which a number is specified: that of the file, or else a unit that suits the size."""
+        """Choose the unit of a specified number: the unit used in the file, or else a unit that suits its size."""
         dimension = self.number.dimension
         if self.number.value is not None or dimension not in _ORDERED_IN:
             return self.number.unit
@@ -130,7 +133,8 @@ class Specified(NamedTuple):
 def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[str, float] | None) -> list[Specified]:
     """Find the errors to specify, with their weights.
 
-    They are the errors of `keys`, or else of the mission's `allocation.specify`, or else of the usual keys.
+    The errors are taken from `keys` if it is given, otherwise from `allocation.specify` of the mission. If neither is
+    given, they are the errors that are specified by default; see `usual_keys`.
 
     Raises
     ------
@@ -182,7 +186,7 @@ def _level_of_oscillator(name: str) -> str:
 
 
 def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """Find the number of a key; raises `QuestionError` if its error cannot be specified."""
+    """Find the number that a key names; raises `QuestionError` if the error at this key cannot be specified."""
     parts = parts_of(key)
     if not is_error(key):
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
@@ -194,7 +198,7 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
 
 
 def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """Find the number that a key names, with the value that the file or a part named in the file gives it.
+    """Find the number that a key names, with its value from the mission file or from a catalogue part named there.
 
     If the value has three components, one for each axis, the component of largest magnitude is taken.
     """
@@ -207,10 +211,10 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
 
 
 def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
-    """Find two keys whose values are multiplied in the mission, so that requirements limit only their product.
+    """Find two keys whose values multiply each other in the mission, so that requirements limit only their product.
 
-    The first key is a level, and the second key is a figure that the level shifts. Returns None if there are no such
-    keys.
+    The first key is a level [dB], and the second key is an error that the level scales. Returns None if there are no
+    such keys.
     """
     for key in keys:
         *section, name = parts_of(key)
@@ -236,13 +240,13 @@ def catalogue(mission: Mission) -> list[Entry]:
 
 
 def suitable_parts(mission: Mission, specified: Specified, most: float, candidates: Sequence[Entry]) -> Iterator[str]:
-    """Yield the ids of the parts that meet a specification whose largest permitted value is `most`.
+    """Yield the ids of the catalogue parts that meet a specification whose largest permitted value is `most`.
 
-    `mission` must state the error. A sensor meets the specification if its figure of the same name is no larger on
-    any axis. An oscillator meets it if its phase noise, converted to the same frequency, is nowhere above the
-    specified spectrum; an oscillator without noise values at some offsets does not meet it. For a satellite only
-    sensors that work in orbit are listed: export rules stop receivers for ground and air use at 515 m/s or 18 km, and
-    inertial sensors measure nothing in free fall.
+    `mission` must state the error. A sensor meets the specification if its own value of the specified error is at
+    most `most` on every axis. An oscillator meets it if its phase noise, converted to the same frequency, is nowhere
+    above the specified spectrum; an oscillator whose noise is unknown at some offset frequencies does not meet it.
+    For a satellite only sensors that work in orbit are listed: export rules disable receivers for ground and air use
+    above 515 m/s or 18 km, and inertial sensors measure nothing in free fall.
     """
     *above, section, figure = parts_of(specified.key)
     for name in PLATFORMS:
@@ -265,8 +269,8 @@ def _is_satellite(platform: Platform) -> bool:
 def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
     """Yield the ids of the oscillators that meet a specified level of phase noise [dB].
 
-    `name` is the name of the platform. The phase noise of a listed oscillator is nowhere above the spectrum of the
-    platform's oscillator, shifted by `level`.
+    `name` is the name of the platform. The phase noise of each listed oscillator is nowhere above the spectrum of the
+    platform's own oscillator, shifted by `level`.
     """
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
@@ -303,8 +307,8 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
     """Find the phase noise spectrum of a platform's oscillator, and the frequency to which it refers [Hz].
 
-    The frequency is that of the oscillator, or the centre frequency of the radar if the oscillator states none. The
-    spectrum is the one at a level of 0 dB.
+    It is the frequency that the file states for the oscillator, or else the centre frequency of the radar. The
+    spectrum applies at a level of 0 dB.
     """
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency

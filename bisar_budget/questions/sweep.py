@@ -122,7 +122,7 @@ class SweepResult(AnswerResult):
         return self.asked.cases
 
     def __repr__(self) -> str:
-        """Text on one line with the varied keys, the number of cases and the number of complying cases."""
+        """Text on one line with the varied keys, the number of cases, and the number of cases that comply."""
         return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self.summary}>"
 
     def _keys(self, between: str) -> str:
@@ -130,7 +130,7 @@ class SweepResult(AnswerResult):
 
     # ------------------------------------------------------------------ checking cases
     def foreseen(self) -> float:
-        """Estimate the time to check all cases [s]; 0 if there are too few cases for an estimate to matter."""
+        """Estimate the time needed to check all cases [s]; 0 if there are so few cases that no estimate is needed."""
         if self.cases.count <= _MANY_CASES:
             return 0.0
 
@@ -211,7 +211,7 @@ class SweepResult(AnswerResult):
 
     @property
     def so_far(self) -> str:
-        """Phrase with the number of cases checked so far, and the number of complying cases among them."""
+        """Phrase with the number of cases checked so far, and how many of them comply."""
         done, comply = self.statuses.total(), complying(self.statuses)
         if not done:
             return "no case was checked"
@@ -229,14 +229,14 @@ class SweepResult(AnswerResult):
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether there are cases with a valid mission, but all of them have the status `not_evaluated`."""
+        """Whether there are cases with a valid mission, and all of them have the status `not_evaluated`."""
         return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
     def drawing(self, trade_data: Gathered, *, is_polar: bool = False) -> str:
         """Draw the checked cases, and return the drawing as SVG text.
 
-        `trade_data` has the columns to draw. If only one key varies, the drawing also shows the utilization of every
-        row that is the worst row of some case. If `is_polar`, the axes of the drawing are polar.
+        `trade_data` has the columns to draw. If only one key varies, the drawing also shows the utilization of each
+        row that is the worst row in at least one case. If `is_polar`, the axes of the drawing are polar.
         """
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
@@ -265,7 +265,7 @@ class SweepResult(AnswerResult):
 
     @property
     def summary(self) -> str:
-        """Phrase with the number of cases and of complying cases; checks the cases if they are not checked yet."""
+        """Phrase with the number of cases, and how many of them comply; cases not checked yet are checked first."""
         return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property
@@ -285,19 +285,19 @@ class SweepResult(AnswerResult):
         return self.columns[name]
 
     def to_dataframe(self, library: str | None = None) -> DataFrame:
-        """The table as a data frame of pandas or of polars, with the columns of the CSV file of `sweep`."""
+        """Return the table as a data frame of pandas or polars, with the same columns as the CSV file of `sweep`."""
         columns = self.columns.items()
         lists = {name: values.tolist() if values.dtype == object else values for name, values in columns}
         return frame_of(lists, library)
 
     def to_xarray(self, chunks: Mapping[str, int] | int | str | None = None) -> "Dataset":
-        """The table as `xarray.Dataset`, with a dimension for each varied key, and CF units and long names.
+        """Return the table as an `xarray.Dataset` with a dimension for each varied key, CF units and long names.
 
         Parameters
         ----------
         chunks : mapping, int or "auto", optional
-            Sizes of chunks by dimension, one size for all dimensions, or `"auto"` for the chunks of the sweep. The
-            values are then arrays of Dask, and cases are checked when Dask computes them.
+            Chunk size of each dimension, one size for all dimensions, or `"auto"` for the chunks of the sweep. The
+            values are then Dask arrays, and cases are checked when Dask computes them.
 
         Raises
         ------
@@ -321,9 +321,9 @@ class SweepResult(AnswerResult):
         )
 
     def _later(self) -> "dict[str, Array]":
-        """Make the columns of the table as Dask arrays, whose chunks of cases are checked when Dask computes them.
+        """Return the columns of the table as Dask arrays; the cases of a chunk are checked when Dask computes it.
 
-        The tasks contain copies of all files that the mission names, so that later changes to these files have no
+        The Dask tasks contain copies of all files that the mission names, so later changes to these files have no
         effect.
         """
         try:
@@ -365,19 +365,19 @@ class SweepResult(AnswerResult):
         return [swept._replace(status=status_of(self.statuses))]
 
     def plot(self, column: str | None = None, *, is_polar: bool = False) -> Picture:
-        """Draw curves of utilization over one key, or a map of the complying cases over two keys.
+        """Draw the utilization as curves over one varied key, or the complying cases as a map over two varied keys.
 
         Parameters
         ----------
         column : str, optional
-            Name of a column of numbers to draw instead.
+            Name of a numeric column that is drawn in place of the utilization or the complying cases.
         is_polar : bool
-            Whether to draw a map over an azimuth as seen from above.
+            Whether to draw the map as seen from above; one of the keys is then an azimuth.
 
         Raises
         ------
         QuestionError
-            Too many keys vary for a drawing, or `column` is not a column of numbers.
+            Too many keys vary for a drawing, or `column` is not a numeric column.
         """
         from bisar_budget.report.drawing.figure import drawing_file
 
@@ -402,9 +402,10 @@ class SweepResult(AnswerResult):
 
 
 def _values(common: tuple[Question, Described, AbstractContextManager[object]], block: Block) -> Mapping[str, Values]:
-    """Check a block of cases, and return the values of each column of the table for these cases.
+    """Check a block of cases, and return the values of every table column for these cases.
 
-    A lock in `common` lets only one thread at a time check cases, because the table caches results.
+    `common` holds the question that the sweep asks, the table, and a lock. With the lock, only one thread at a time
+    checks cases, because the table caches results.
     """
     question, table, lock = common
     with lock:
@@ -412,7 +413,10 @@ def _values(common: tuple[Question, Described, AbstractContextManager[object]], 
 
 
 def percentage(count: int, total: int) -> str:
-    """Format `count` as a percentage of `total`; `0 %` only if `count` is 0, `100 %` only if it equals `total`."""
+    """Format `count` as a percentage of `total`.
+
+    The text is `0 %` only if `count` is 0, and `100 %` only if `count` equals `total`.
+    """
     if count in (0, total):
         return "100 %" if count else "0 %"
     return f"{min(max(100 * count / total, 0.1), 99.9):.3g} %"

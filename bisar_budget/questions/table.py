@@ -79,7 +79,7 @@ def _verdict(
 
     The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
     first one. A row that is not evaluated and has no utilization cannot be the binding row. If the mission does not
-    comply, the binding row is one of the rows that break a limit, and a waived row only if no other row breaks one.
+    comply, the binding row is a row that breaks a limit; it is a waived row only if no other row breaks a limit.
     If the verdict of a case is `not_evaluated`, its utilization is NaN: the missing evaluation decides the verdict,
     not the utilization of any row.
     """
@@ -197,8 +197,8 @@ def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> No
 class Variation:
     """A mission that can be read again with changed values, which are checked like the values of a file.
 
-    Values changed by command-line options stay changed. `model` replaces the gating model of the mission. `named` has
-    the content of the files that the mission names, for machines without these files.
+    Values changed by command-line options stay changed. `model` replaces the model that decides the verdict on the
+    mission. `named` has the content of the files that the mission names, for machines without these files.
     """
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
@@ -218,7 +218,10 @@ class Variation:
         return self.parse(tree, mission.data, mission.file, self.model, changes=(*kept, *changes))
 
     def at(self, values: Mapping[Number, float], changes: Sequence[SetValue] = ()) -> Mission:
-        """Read the mission with changes and new numbers in SI; raises `MissionError` if the result is invalid."""
+        """Read the mission with changed values and with new numbers in SI.
+
+        Raises `MissionError` if the mission is invalid with them.
+        """
         numbers = [SetNumber.of(number.key, value, number.dimension.si) for number, value in values.items()]
         return self.read([*changes, *numbers])
 
@@ -306,7 +309,7 @@ class Table:
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
     def part(self, start: int, stop: int, values: Mapping[str, Values]) -> Part:
-        """Check the cases `start` to `stop` - 1, whose values are arrays (stop - start,) by key."""
+        """Check the cases `start` to `stop` - 1; `values` has an array (stop - start,) for each varied key."""
         columns = self._columns(values, stop - start)
         if self.question.choices:
             for table, cases in self._by_words(columns):
@@ -318,7 +321,7 @@ class Table:
         return Part(start, stop, columns)
 
     def reads(self, values: Mapping[str, Values]) -> int:
-        """Count the cases that have to be read one by one, for values (cases,) by key."""
+        """Count the cases that have to be read one by one; `values` has an array (cases,) for each varied key."""
         cases = len(next(iter(values.values())))
         columns = self._columns(values, cases)
         if self.question.choices:
@@ -395,7 +398,7 @@ class Table:
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
-            """Read the missions that arrays cannot represent, one by one; adds their indices to `read_indices`."""
+            """Read the missions that arrays cannot represent, and append their indices to `read_indices`."""
             for index in np.delete(np.arange(cases), indices).tolist():
                 mission = self._read(columns, index)
                 if mission is not None:
@@ -406,7 +409,7 @@ class Table:
             self._check(columns, np.array(read_indices)[cases_of_shape], mission, mission.geometry)
 
     def _arrays(self, columns: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
-        """Find the cases that need not be read one by one, because arrays of numbers can represent them.
+        """Find the cases that arrays of numbers can represent, so that they are not read one by one.
 
         Returns the indices of these cases, the mission with the arrays, and its geometry.
         """

@@ -108,7 +108,8 @@ _OPTIONAL_SECTIONS = (IMU_KIND.name, "registered")
 def _is_held_of_error(error: MotionError, steps: Sequence[str], is_stated: bool) -> bool:
     """Whether an array can replace a number of a motion error.
 
-    `steps` are the parts of its key below the motion error; `is_stated` tells whether the file states the number.
+    `steps` are the parts of the number's key below the motion error; `is_stated` tells whether the file states the
+    number.
     """
     if steps[0] in MOTION:
         return steps[0] not in MOTION_KINDS or error.covariance is None  # which a covariance replaces
@@ -140,8 +141,8 @@ _FREE = {
 def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
     """Whether each case certainly forms an image, (cases,); numbers of `mission` may be arrays (cases,).
 
-    The result is also False for cases near the limit at which an image forms. Such a case has to be read like a file,
-    which decides exactly and gives the reason.
+    The result is False for a case without an image, and for a case near a limit of image formation. A case near a
+    limit has to be read like a mission file, which decides exactly and gives the reason.
     """
     is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
@@ -233,7 +234,7 @@ def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
     Raises
     ------
     QuestionError
-        The key has no errors, or the mission states none below it.
+        There cannot be errors below the key, or the mission does not state any of them.
     """
     steps = parts_of(key)
     if not any(step in _ERROR_SECTIONS for step in steps[:3]):
@@ -249,8 +250,8 @@ def _below(
 ) -> tuple[SectionValue, int]:
     """Scale all errors below a key by a factor.
 
-    `value` is a section, list or number of the mission, and `steps` are the parts of the key that lead from it to the
-    errors. Returns the changed value, and the number of scaled errors that are not 0.
+    `value` is a section, list or number of the mission, and `steps` are the parts of the key that lead from this
+    value to the errors. Returns the changed value, and the number of scaled errors that are not 0.
     """
     if not steps:
         name = parts_of(key)[-1]
@@ -312,7 +313,7 @@ def _scaled(value: SectionValue, reader: Reader[object], factor: PerCase, is_clo
 def _form(reader: Reader[object], value: object) -> Reader[object]:
     """Find the reader that fits a value.
 
-    For a `OneOf` it is one of the alternatives; otherwise it is `reader` itself.
+    If `reader` is a `OneOf`, the result is the alternative that fits; otherwise it is `reader` itself.
     """
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity

@@ -56,7 +56,7 @@ def verify_all(
 ) -> list[VerifiedMission]:
     """Form images at the limits of several missions, in processes on this machine or on the workers of a scheduler.
 
-    `outside` describes influences on the verdicts from outside the mission files. The other arguments and the
+    `outside` describes the influences on the verdicts that are not in the mission files. The other arguments and the
     exceptions are those of `verify`.
     """
     analysed = [(mission, Analysis(mission)) for mission in missions]

@@ -3,9 +3,9 @@
 A case is one collection. All functions take many cases at once.
 
 The recorded data contain the ranges of the true paths. The processor subtracts the ranges of the measured paths. For
-a ground point x the range error ρ(τ; x) is the recorded range less the expected range. The phase over band and
-aperture is 2πfρ/c. To second order in that phase the image peaks where the variance of the phase is smallest. A
-constant phase does not count. So the image point minimises
+a ground point x, the range error ρ(τ; x) is the recorded range minus the range that the processor expects. The phase
+at frequency f and slow time τ is 2πfρ/c. To second order in this phase, the image has its peak where the variance of
+the phase over band and aperture is smallest. A constant phase has no effect. The image point therefore minimises
 
     V(x) = Var_τ(ρ) + b²⟨ρ²⟩,    b² = B²/(12 f₀²),
 
@@ -13,13 +13,13 @@ for an evenly filled band of width B about f₀. ⟨ ⟩ is the mean over the ap
 (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, so that V = ⟨ρ, ρ⟩. The image point satisfies ⟨∂ρ/∂x, ρ⟩ = 0. H is the matrix ⟨g, gᵀ⟩ of the
 gradient g = ∂ρ/∂x (see `image_plane`). The aperture is the interval −1 … 1 of the Legendre polynomials Pₙ. If b is
 much larger than the square of the angle by which the line of sight turns, ρ at the image point has no P₀ part and no
-P₁ part. With a narrow band or a wide turn, both parts remain.
+P₁ part. If the band is narrow or the turn is wide, both parts remain.
 
-Legendre polynomials are fitted to ρ at the image point, at the nodes of Gauss-Legendre quadrature over the aperture.
-The P₂ and P₃ parts are the quadratic and the cubic phase. The remainder beyond P₃ spreads energy over the image. V
-also contains a part that is none of these: mainly P₀ and P₁ parts that the displacement cannot remove, because the
-band and the turn of the line of sight do not resolve it. The hidden phase is the quadratic phase that lowers the peak
-as much as this part of V.
+The range error ρ at the image point is sampled at the nodes of Gauss-Legendre quadrature over the aperture, and
+Legendre polynomials are fitted to the samples. The P₂ and P₃ parts are the quadratic and the cubic phase. The
+remainder beyond P₃ spreads energy over the image. V has a further contribution, mainly from P₀ and P₁ parts that a
+displacement cannot remove, because the band and the turn of the line of sight do not resolve them. The hidden phase
+is the quadratic phase that would lower the peak as much as this contribution.
 
 For errors so small that their effects are proportional to them, `ExactRanges.effect` gives the same results. The
 method is derived here. `tests/theory/test_image_point.py` checks it against images formed by direct sums.
@@ -71,19 +71,19 @@ class PointSettings:
     Attributes
     ----------
     end_rad : float
-        Hidden phase above which a path that is near a fold ends, because no ground point has the recorded range
-        history. [rad]
+        Largest hidden phase at which a path continues near a fold. If the hidden phase is larger, the path ends
+        there, because no ground point has the recorded range history. [rad]
     folded_fraction : float
-        Root of the determinant of H at a point (the area that the gradient g spans), as a fraction of its value at
-        the scene centre. A path on which the fraction is smaller is near a fold or beyond it.
+        Threshold for the root of the determinant of H (the area that the gradient g spans), as a fraction of the root
+        at the scene centre. A path with a smaller fraction is near a fold or beyond it.
     near_fold_fraction : float
-        Value of the same fraction below which a point counts as near a fold. There the area changes much in a small
-        step, and one peak may fade into another.
+        Another threshold for the same fraction. A point with a smaller fraction counts as near a fold, where the area
+        changes much in a small step, and a peak may fade into another peak.
     last_step_rad : float
         Largest change of a phase that the last step of a search may cause. The part of the change that is linear in
         the step does not count. [rad]
     last_step_near_fold_fraction : float
-        Largest square of the last step near a fold, as a fraction of the largest square elsewhere.
+        Largest accepted square of the last step near a fold, as a fraction of the largest accepted square elsewhere.
     nearest_fraction : float
         Smallest accepted distance between a platform and a point, as a fraction of the nearest range. At a smaller
         distance, rounding errors dominate the direction of the line of sight.
@@ -91,17 +91,17 @@ class PointSettings:
         Largest accepted ratio of the square of a Newton step to the square of the step before. If the ratio is
         larger, the iteration does not converge.
     bowl_fraction : float
-        Determinant of half the second derivative of V, as a fraction of the determinant of H. If the fraction is
-        smaller, a step uses H instead of the second derivative.
+        Threshold for the determinant of half the second derivative of V, as a fraction of the determinant of H. A
+        step uses the second derivative if the fraction is larger, and H otherwise.
     damping_fraction : float
-        Damping of the first step of a descent, as a fraction of the trace of H at the centre.
+        Damping of the first step of a descent, as a fraction of the trace of H at the scene centre.
     damping_ratio : float
         Factor by which the damping changes with each step.
     max_newton_iterations, max_descent_steps : int
-        Largest number of steps of both searches.
+        Largest number of steps of a search by Newton's method, and of a descent.
     course_steps : tuple of int
         Numbers of steps in which `followed` increases an error to its full size. The second number is used for points
-        that are lost with the first.
+        that are lost with the first number.
     samples_at_once : int
         Number of samples (nodes times lanes) that one block processes, so that its arrays fit into a cache.
     """
@@ -129,16 +129,16 @@ _MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 5, 11
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
-    """Slow times of the nodes at which error histories that are not smooth are sampled, (FINE_NODE_COUNT,). [s]"""
+    """Slow times (FINE_NODE_COUNT,) at which error histories are sampled if they are not smooth. [s]"""
     return nodes(FINE_NODE_COUNT).places * (aperture_time_s / 2)
 
 
 class Effect(NamedTuple):
-    """Effect of one unit of an error by the published model, signed like the range error.
+    """Effect of one unit of an error by the published model, with the sign of the range error.
 
-    Fields are numbers for one case or arrays for many. `constant` [m/unit] and `linear` [(m/s)/unit] are terms of the
-    range error at the aperture midpoint. `qpe` and `cubic` are the quadratic and the cubic phase at the aperture
-    edge. [rad/unit]
+    Fields are numbers for a single case, or arrays for many cases. `constant` [m/unit] and `linear` [(m/s)/unit] are
+    the constant and the linear term of the range error at the aperture midpoint. `qpe` and `cubic` are the quadratic
+    and the cubic phase at the aperture edge. [rad/unit]
     """
 
     constant: PerCase
@@ -150,9 +150,9 @@ class Effect(NamedTuple):
 class FullEffect(NamedTuple):
     """Effect of one unit of a small error by the full model.
 
-    Fields are numbers for one case or arrays for many. `east` and `north` [m/unit] are the displacement. `qpe` and
-    `cubic` [rad/unit] are the quadratic and the cubic phase at the aperture edge. They have the sign of the range
-    error that remains at the displaced point.
+    Fields are numbers for a single case, or arrays for many cases. `east` and `north` [m/unit] are the displacement.
+    `qpe` and `cubic` [rad/unit] are the quadratic and the cubic phase at the aperture edge. They have the sign of the
+    range error that remains at the displaced point.
     """
 
     east: PerCase
@@ -163,10 +163,11 @@ class FullEffect(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTags:
-    """Lanes whose error is a time-tag error: an error δt shifts a platform by p(τ + δt) − p(τ) along its path p.
+    """Time-tag errors among the errors of `Lanes`.
 
-    `paths` are the paths of transmitter and receiver. `times` (nodes, cases) are the slow times of the nodes. [s]
-    `case` (lanes,) is the case of each lane, or -1 for a lane whose error is of another kind.
+    A time-tag error δt shifts a platform along its path p by p(τ + δt) − p(τ). `paths` are the paths of transmitter
+    and receiver. `times` (nodes, cases) [s] are the slow times of the nodes. `case` (lanes,) is the case of each
+    lane, or -1 for a lane whose error is of another kind.
     """
 
     paths: tuple[PlatformState, PlatformState]
@@ -179,10 +180,11 @@ class TimeTags:
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
-        """Copy `along`, the shifts or directions of one platform, and replace the values of time-tag lanes.
+        """Copy `along`, the shifts or directions of one platform, and replace the values for time-tag errors.
 
-        Returns three arrays (nodes, lanes), one per axis. A time-tag lane gets the shift that its time-tag error
-        `tag_s` [s] causes. [m] If `is_rate`, it gets the change of this shift per second of time-tag error. [m/s]
+        Returns three arrays (nodes, lanes), one per axis. The new values are the shifts that the time-tag errors
+        `tag_s` [s] cause, in m. If `is_rate`, the new values are the changes of these shifts per second of time-tag
+        error, in m/s.
         """
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -203,18 +205,18 @@ class Lanes:
     case : (lanes,)
         The case of each error.
     at_nodes : (nodes, lanes)
-        Size of a unit error at the nodes: the position error [m/unit], the range error by a clock [m/unit], or the
-        sign of a time-tag error.
+        Size of a unit error at the nodes: the position error [m/unit], the range error due to a clock error [m/unit],
+        or the sign of a time-tag error.
     moves : (2, lanes)
         1 if the error moves the transmitter (first row) or the receiver (second row), else 0.
     directions : (2, 3, nodes, lanes)
         Directions in which a unit of each error moves transmitter and receiver; zero for a platform that the error
-        does not move. For a small time-tag error it is the velocity. [m/s] The node axis has length 1 if no direction
-        turns; the lane axis has length 1 if all lanes share the directions.
+        does not move. For a small time-tag error, the direction is the velocity [m/s]. The node axis has length 1 if
+        no direction turns; the lane axis has length 1 if all lanes share the directions.
     order : (lanes,)
         Power of slow time with which a position error grows; -1 for a clock error.
     tags : TimeTags, optional
-        Paths of the lanes that are time tags, if any lane is.
+        Time-tag errors among the lanes; None if there are no such errors.
     """
 
     case: Indices
@@ -241,34 +243,41 @@ class Lanes:
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """Errors of the collections that `ExactRanges.at` returns for the same `case`, one lane per collection.
+        """Rearrange the errors for the collections that `ExactRanges.at` returns for the same `case`.
 
-        The present lanes must be one per case, in the order of the cases.
+        The result has one lane per collection. This object must have one lane per case, in the order of the cases.
         """
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> Floats:
-        """Shifts of both platforms at the nodes that errors of given sizes cause, (2, 3, nodes, lanes). [m]"""
+        """Shifts of both platforms at the nodes, caused by errors of given sizes, (2, 3, nodes, lanes). [m]"""
         course = self.at_nodes * size
         shifts: Floats = self.directions * course
         return shifts if self.tags is None else self._tagged(self.tags, course, shifts)
 
     def ways(self, size: Any) -> Floats:
-        """Directions in which both platforms move as errors of the given sizes grow, shaped like `directions`.
+        """Directions in which both platforms move if errors of the given sizes grow, in the shape of `directions`.
 
-        The directions of time tags are the velocities at the shifted times, (2, 3, nodes, lanes).
+        For time-tag errors, the directions are the velocities at the shifted times, and the shape is (2, 3, nodes,
+        lanes).
         """
         if self.tags is None:
             return self.directions
         return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
     def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
-        """Return the shifts or directions `along` of both platforms, with the values of time-tag lanes replaced."""
+        """Return a copy of `along`, the shifts or directions of both platforms, with new values for time-tag errors.
+
+        See `TimeTags.put` for these values and for `is_rate`.
+        """
         both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
         return np.asarray(both * self.moves[:, None, None])
 
     def clock(self, size: Any) -> Floats:
-        """Range error at the nodes that clock errors of given sizes cause; 0 for other errors, (nodes, lanes). [m]"""
+        """Range error at the nodes due to clock errors of given sizes, (nodes, lanes). [m]
+
+        It is 0 for errors of another kind.
+        """
         is_clock = 1.0 - self.moves.max(axis=0)
         return np.asarray(self.at_nodes * (size * is_clock))
 
@@ -276,11 +285,11 @@ class Lanes:
 class SmallErrors(NamedTuple):
     """List of small unit errors that all cases have in common; their effects are proportional to their sizes.
 
-    `courses` (courses, nodes, cases) are the distinct error histories over the aperture. [m/unit] `course` (errors,)
+    `courses` (courses, nodes, cases) [m/unit] are the distinct error histories over the aperture. `course` (errors,)
     is the index of each error's history. `ways` (errors, 7, cases) are the components of a unit of each error:
-    transmitter east, north and up, receiver east, north and up, and the range error by the clock. The axis of cases
-    has length 1 if all cases share the components. If the direction of an error changes within the aperture,
-    `turning` maps the index of the error to its components at the nodes, (7, nodes, cases).
+    transmitter east, north and up, receiver east, north and up, and the range error due to the clock. The axis of
+    cases has length 1 if all cases share the components. `turning` is for errors whose direction changes within the
+    aperture. It maps the index of such an error to its components at the nodes, (7, nodes, cases).
     """
 
     courses: Floats
@@ -305,18 +314,19 @@ class SmallErrors(NamedTuple):
         return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
-        """Errors of the collections that `ExactRanges.at` returns for the same `case`."""
+        """Rearrange the errors for the collections that `ExactRanges.at` returns for the same `case`."""
         courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
 
 class ImagePoints(NamedTuple):
-    """Image points of lanes and the phases that remain there, computed from exact ranges; each field is (lanes,).
+    """Image points and the phases that remain there, computed from exact ranges, for one error per lane.
 
-    `is_settled` is True where the search converged. `east` and `north` are the displacement. [m] `quadratic` and
-    `cubic` are the phases at the aperture edge, with the sign of the range error. `hidden` is the hidden phase, and
-    `rest` the rms phase beyond the cubic. [rad] `turn` is the root of the determinant of H at the point (the area
-    that the gradient g spans), as a fraction of its value at the scene centre. It is negative beyond a fold.
+    Each field has the shape (lanes,). `is_settled` is True where the search converged. `east` and `north` [m] are the
+    displacement. `quadratic` and `cubic` [rad] are the phases at the aperture edge, with the sign of the range error.
+    `hidden` [rad] is the hidden phase, and `rest` [rad] the rms of the phase beyond the cubic phase. `turn` is the
+    root of the determinant of H at the image point (the area that the gradient g spans), as a fraction of the root at
+    the scene centre. It is negative beyond a fold.
     """
 
     is_settled: Booleans
@@ -331,11 +341,12 @@ class ImagePoints(NamedTuple):
 
 @dataclass(frozen=True)
 class ExactEffect:
-    """Effect of one error, computed from exact ranges, in plain numbers.
+    """Effect of one error, computed from exact ranges, as floats.
 
-    `displacement` is the displacement east and north. [m] `quadratic` and `cubic` are the phases at the aperture
-    edge, with the sign of the range error. `hidden` is the hidden phase: its range error is one that the band and the
-    turn of the line of sight do not resolve. `rest` is the rms phase beyond the cubic. [rad]
+    `displacement` [m] is the displacement east and north. `quadratic` and `cubic` [rad] are the phases at the
+    aperture edge, with the sign of the range error. `hidden` [rad] is the hidden phase, caused by a range error that
+    the band and the turn of the line of sight do not resolve. `rest` [rad] is the rms of the phase beyond the cubic
+    phase.
     """
 
     displacement: GroundVector
@@ -346,7 +357,7 @@ class ExactEffect:
 
     @property
     def equal_loss(self) -> float:
-        """Quadratic phase that lowers the peak as much as quadratic and hidden phase together. [rad]"""
+        """Quadratic phase that lowers the peak as much as the quadratic and the hidden phase together. [rad]"""
         return math.hypot(self.quadratic, self.hidden)
 
     def moved(self, by: GroundVector) -> GroundVector:
@@ -376,8 +387,9 @@ class ExactRanges:
     Attributes
     ----------
     gradient : (2, 4, n)
-        Change of the range error if the point moves a metre east (first) or north (second). The four values are the
-        mean of the change, and its P₁, quadratic and cubic part at the aperture edge. [m/m]
+        Change of the range error if the ground point moves a metre east (first row) or north (second row). Each row
+        has the mean of the change over the aperture, and the values of its linear (P₁), quadratic and cubic parts at
+        the aperture edge. [m/m]
     """
 
     def __init__(
@@ -454,7 +466,8 @@ class ExactRanges:
     def slopes(self) -> Floats:
         """Horizontal components of u_t + u_r, the sum of both lines of sight, (2, nodes, n). [m/m]
 
-        It is the decrease of the range sum if the point moves a metre east (first row) or north (second row).
+        A component is the decrease of the range sum if the ground point moves a metre east (first row) or north
+        (second row).
         """
         (p, q), (R, S) = self.tracks, self.ranges
         return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
@@ -467,20 +480,24 @@ class ExactRanges:
 
     @cached_property
     def sine(self) -> Floats:
-        """Sine of the angle between the ground direction that the band resolves and the one that the turn resolves.
+        """Sine of the angle on the ground, at the scene centre, between the two directions of resolution, (n,).
 
-        It applies to the scene centre, (n,). The turn is that of the line of sight. See `GroundMatrix.sine`.
+        The band resolves points along one direction, and the turn of the line of sight resolves points along the
+        other direction. See `GroundMatrix.sine`.
         """
         return self.matrix.sine
 
     @cached_property
     def product_weights(self) -> Floats:
-        """Weights of the scalar product ⟨a, c⟩ of V, for histories mapped by `Sampling.centred`, (nodes + 1, n)."""
+        """Weights of the scalar product ⟨a, c⟩ that is defined in the module docstring, (nodes + 1, n).
+
+        They apply to the histories a and c after both have been mapped by `Sampling.centred`.
+        """
         return np.concatenate(((1 + self.band) * self.mean, self.band[None]))
 
     @cached_property
     def near_fold(self) -> Floats:
-        """Threshold for the determinant of H; with a smaller determinant, a point is near a fold, (n,)."""
+        """Threshold for the determinant of H, below which a point counts as near a fold, (n,)."""
         return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
     @cached_property
@@ -514,7 +531,7 @@ class ExactRanges:
 
     @cached_property
     def rounding(self) -> Floats:
-        """Smallest phase that exceeds the rounding errors of a phase history in double precision, (n,). [rad]"""
+        """Threshold below which a phase counts as a rounding error of double precision, (n,). [rad]"""
         recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
         if self.has_direct_path:
             recorded = recorded + self.baselines.max(axis=0)
@@ -533,7 +550,7 @@ class ExactRanges:
 
     @cached_property
     def heard_along(self) -> tuple[VectorArrays, VectorArrays]:
-        """Unit vectors at the nodes from receiver to transmitter, and from transmitter to receiver.
+        """Unit vectors along the direct path at the nodes: from receiver to transmitter, and reversed.
 
         Each vector has three components (nodes, n).
         """
@@ -553,14 +570,14 @@ class ExactRanges:
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Range error at the nodes per metre of position error of a platform along a direction, (nodes, n). [m/m]
 
-        It is −u·d, or −(u − b)·d if the direct path is the clock; u is the line of sight to the platform, d the
-        direction, and b the unit vector from the other platform to this one.
+        It is −u·d, or −(u − b)·d if the direct path is the clock. Here, u is the line of sight to the platform, d the
+        direction, and b the unit vector from the other platform to this platform.
         """
         change: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
         return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
-        """Range error at the nodes for one unit of each small error in `lanes`, (nodes, lanes). [m/unit]
+        """Range error at the nodes due to one unit of each small error in `lanes`, (nodes, lanes). [m/unit]
 
         `lanes` has one error for each case, or any number of errors of a single case.
         """
@@ -599,29 +616,29 @@ class ExactRanges:
 
     @cached_property
     def order_weights(self) -> Floats:
-        """Legendre orders 0 to 3 of the remaining range error, per metre of range error at each node. [m/m]
+        """Legendre parts of the range error at the displaced point, per metre of range error at a node. [m/m]
 
-        The array is (4, nodes, n). The remaining range error is that at the displaced point. The value of each order
-        is taken at the aperture edge.
+        The array has the shape (4, nodes, n), for the orders 0 to 3. Its products with the range error, summed over
+        the nodes, are the parts, given by their values at the aperture edge.
         """
         (by_east, by_north), (east, north) = self.gradient, self.place_weights
         return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
 
     @cached_property
     def phase_weights(self) -> Floats:
-        """Quadratic and cubic phase per metre of range error at each node, (2, nodes, n). [rad/m]
+        """Quadratic and cubic phase at the displaced point, per metre of range error at each node. [rad/m]
 
-        The phases are those at the displaced point.
+        The array has the shape (2, nodes, n).
         """
         return np.asarray(self.k * self.order_weights[2:])
 
     @cached_property
     def hidden_weights(self) -> Floats:
-        """Contributions of Legendre orders 0 to 3 to the hidden phase, per metre of range error at a node. [rad/m]
+        """Contributions of Legendre parts to the hidden phase, per metre of range error at each node. [rad/m]
 
-        The array is (4, nodes, n). The square of the hidden phase is the sum of the squares of its contributions.
-        Range errors beyond order 3 are not included. Their weight in the hidden phase is only b², which is small,
-        unless a line of sight turns by more than `MAX_TURN_RAD`.
+        The array has the shape (4, nodes, n), for the orders 0 to 3. The square of the hidden phase is the sum of the
+        squares of its contributions. Range errors beyond order 3 are not included. Their weight in the hidden phase
+        is only b², which is small. The exception is a line of sight that turns by more than `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -631,7 +648,8 @@ class ExactRanges:
     def most_per_metre(self) -> Floats:
         """Upper bounds of the effects of any range error whose magnitude is at most one metre, (4, n).
 
-        The first three rows bound the quadratic, cubic and hidden phase. [rad] The last bounds the displacement. [m]
+        The first three rows [rad] bound the quadratic, cubic and hidden phase. The last row [m] bounds the
+        displacement.
         """
         mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
         # V of such an error, and the variance as a part of V, are at most 1 + b². The displacement never increases V.
@@ -643,7 +661,7 @@ class ExactRanges:
     def effect(self, range_error: Floats) -> FullEffect:
         """Displacement that small range errors cause, and the phases that remain at the displaced point.
 
-        `range_error` is the range error at the nodes, (..., nodes, cases). [m] Results that are only rounding errors
+        `range_error` [m] is the range error at the nodes, (..., nodes, cases). Results that are only rounding errors
         are set to 0.
         """
         size = np.abs(range_error)
@@ -665,26 +683,26 @@ class ExactRanges:
     def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
         """Range error that remains at the point to which small errors displace the response. [m]
 
-        `range_error` is the range error at the nodes, (..., nodes, cases). [m] `moved` is the displacement east and
-        north, (..., cases). [m]
+        `range_error` [m] is the range error at the nodes, (..., nodes, cases). `moved` [m] is the displacement east
+        and north, (..., cases).
         """
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
 
     def unresolved(self, remaining: Floats) -> tuple[Floats, Floats]:
-        """Hidden phase and rms phase beyond the cubic, computed from the range errors that remain at the nodes. [rad]
+        """Hidden phase, and rms of the phase beyond the cubic phase, from range errors at the displaced point. [rad]
 
-        `remaining` is (..., nodes, cases). [m]
+        `remaining` (..., nodes, cases) [m] are these range errors, sampled at the nodes.
         """
         orders = self.fit @ remaining
         squares = self.mean_squares(remaining, orders)
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
-        """Mean squares over the aperture of range errors and of their part beyond order 3, (..., cases) each. [m²]
+        """Mean squares over the aperture of range errors and of their parts beyond Legendre order 3. [m²]
 
-        `remaining` (..., nodes, cases) are the range errors at the nodes, and `orders` (..., 4, cases) their orders 0
-        to 3. [m]
+        Both results have the shape (..., cases). `remaining` (..., nodes, cases) are the range errors at the nodes,
+        and `orders` (..., 4, cases) their Legendre parts of orders 0 to 3. [m]
         """
         beyond = remaining - self.sampling.polynomials @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
@@ -695,15 +713,15 @@ class ExactRanges:
     ) -> ImagePoints:
         """Find the points to which errors of given sizes displace the scene centre, and the phases that remain there.
 
-        Newton's method searches from the point `near`, east and north. [m] If `is_at_fold`, a descent on V from the
+        Newton's method searches from the point `near`, east and north [m]. If `is_at_fold`, a descent on V from the
         same point is used instead. Use `point_paths` to follow an image point as an error grows. On the ground there
-        may be a line, the fold, on which the gradients of range and Doppler are parallel. Points beyond it are not
-        returned, because no growing error leads there.
+        may be a line, the fold, on which the gradients of range and Doppler are parallel. Points beyond the fold are
+        not returned, because the image point does not get there as an error grows.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error at the nodes, for a ground point and an error of given size per lane, (nodes, lanes). [m]
+        """Range error at the nodes for a ground point and an error of given size in each lane, (nodes, lanes). [m]
 
         `point` has the coordinates of the ground points, east and north. [m]
         """
@@ -715,7 +733,7 @@ class ExactRanges:
         return np.asarray(clock - growth[0] - growth[1])
 
     def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
-        """Clock error c·t̃ that shifts of the platforms cause if the direct path is the clock, (nodes, lanes). [m]"""
+        """Clock error c·t̃ due to shifts of the platforms if the direct path is the clock, (nodes, lanes). [m]"""
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
@@ -724,7 +742,7 @@ class ExactRanges:
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Rate at which image points move as the errors grow, east and north. [m/unit]
 
-        `point` are the image points for errors of the sizes `size`. The image point is the minimum of V. The result
+        `point` has the image points for errors of the sizes `size`. The image point is the minimum of V. The result
         follows from the second derivative of V and from the change of the slope of V with the error.
         """
         course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
@@ -755,9 +773,9 @@ class ExactRanges:
     ) -> ImagePoints:
         """Find the image point of each lane, the minimum of V, by Newton's method, or by a descent if `is_at_fold`.
 
-        `clock` are the range errors by clocks, (nodes, lanes). [m] `shifts` are the three components of the shift of
-        each platform at the nodes. [m] `near` is the point at which the search starts, east and north. [m]
-        `case` are the cases of the lanes.
+        A lane is one error of one case. `clock` (nodes, lanes) [m] has the range errors due to clocks. `shifts` [m]
+        has the three components of the shift of each platform at the nodes. `near` [m] is the point at which the
+        search starts, east and north. `case` has the index of the case of each lane.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
@@ -785,11 +803,11 @@ class ExactRanges:
         return np.empty((_ARRAY_COUNT, 2, self.fit.shape[1], lanes))
 
     def _measured(self, clock: Floats, shifts: Iterable[Any], case: Indices, room: Floats) -> tuple[Floats, Floats]:
-        """Prepare what `_grown` needs: return the clock error, and write five arrays (2, nodes, lanes) into `room`.
+        """Prepare the arguments of `_grown`; return the clock error, and five arrays (2, nodes, lanes) in `room`.
 
         If a platform's position vector r changes by d, its range R grows by p/(R + √(R² + p)), with p = d·(2r + d).
-        This form has no rounding error of the size of the range. For a ground point at g = (east, north) instead of
-        the origin, p is replaced by p − g·(2r̂ − g), with the measured position r̂ = r + d.
+        In this form, the rounding error is not proportional to the range. For a ground point at g = (east, north)
+        instead of the origin, p is replaced by p − g·(2r̂ − g), with the measured position r̂ = r + d.
         """
         if self.has_direct_path:  # the error of the distance is then the only clock error
             clock = clock + self._heard(shifts, case)
@@ -815,12 +833,12 @@ class ExactRanges:
 
 
 class _PointSearch:
-    """Search for the image points of lanes by Newton's method or by a descent.
+    """Search for the image points of errors by Newton's method or by a descent.
 
-    `lane` are the indices of the lanes that have not settled, `of` their cases, and `point` their current points,
-    east and north. [m] `settled` has one entry for each step with which the search of some lanes converged. An entry
-    holds the indices of these lanes, `_GroundView.seen` before the step, the determinant of H there, the step, and
-    the points after it.
+    A lane is one error of one case. `lane` has the indices of the lanes whose search has not converged. `of` has the
+    cases of these lanes, and `point` [m] their current points, east and north. `settled` has one entry for each step
+    in which the search of some lanes converged. An entry has the indices of these lanes, `_GroundView.seen` and the
+    determinant of H before the step, the step, and the points after the step.
     """
 
     def __init__(
@@ -833,7 +851,7 @@ class _PointSearch:
         self._set_cases()
 
     def run(self) -> None:
-        """Search by Newton's method until each lane has settled or does not converge."""
+        """Search by Newton's method until each lane has converged, or is found not to converge."""
         before = np.full(self.lane.size, math.inf)
         for _ in range(POINT_SETTINGS.max_newton_iterations):
             view = self._view()
@@ -852,9 +870,9 @@ class _PointSearch:
                 self._go_on(going)
 
     def descend(self) -> None:
-        """Search by damped steps that only decrease V.
+        """Search by damped steps; a step that would increase V is rejected.
 
-        It is slower than `run`, and reliable where the second derivative of V is small, such as near a fold.
+        This is slower than `run`, but reliable where the second derivative of V is small, such as near a fold.
         """
         exact, count = self.exact, self.lane.size
         (trace,) = _take_cases([exact.matrix.xx + exact.matrix.yy], self.of)
@@ -883,10 +901,10 @@ class _PointSearch:
             self.point = best_point + step
 
     def store(self, points: ImagePoints) -> None:
-        """Write the settled points and the phases that remain there into `points`; points beyond a fold are left out.
+        """Write the image points and the phases that remain there into `points`; points beyond a fold are left out.
 
-        The range error at a point is the range error before the last step plus its linear change by the step. Phases
-        smaller than the rounding error are set to 0.
+        The range error at a point is the range error before the last step, plus its linear change due to this step.
+        Phases smaller than the rounding error are set to 0.
         """
         if not self.settled:
             return
@@ -920,7 +938,10 @@ class _PointSearch:
         return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
 
     def _last_step(self, view: "_GroundView") -> Floats:
-        """Threshold below which each lane's search ends, for the square of a step over the nearest range. [m]"""
+        """Threshold for the step of each lane, below which the search of the lane ends. [m]
+
+        The threshold is compared with the square of the step, divided by the smallest range of a platform.
+        """
         is_near_fold = view.determinant < self.near_fold
         smaller, usual = (
             POINT_SETTINGS.last_step_near_fold_fraction * POINT_SETTINGS.last_step_rad,
@@ -935,7 +956,7 @@ class _PointSearch:
         self.k, self.least_range, self.near_fold, self.weights = _take_cases(of_cases, self.of)
 
     def _go_on(self, going: Indices) -> None:
-        """Continue only with the lanes at the indices `going`."""
+        """Continue the search only for the lanes at the indices `going`."""
         self.lane, self.of = self.lane[going], self.of[going]
         self.point, self.clock, self.measured = _take([self.point, self.clock, self.measured], going)
         self.room = self.room[..., : going.size]
@@ -943,20 +964,20 @@ class _PointSearch:
             self._set_cases()
 
     def _keep(self, done: Indices, view: "_GroundView", step: Floats) -> None:
-        """Mark the lanes `lane[done]` as settled, and store their view, point, step and determinant."""
+        """Record that the search of the lanes `lane[done]` has converged; store the last view, step and point."""
         if done.size:
             arrays = [self.lane, view.seen, view.determinant, step, self.point]
             self.settled.append(arrays if done.size == self.lane.size else _take(arrays, done))
 
 
 class _GroundView:
-    """Range errors, lines of sight and derivatives of V at one ground point per lane.
+    """Range errors, lines of sight, and derivatives of V (see the module docstring), at one ground point per lane.
 
     Attributes
     ----------
     seen : (3, nodes, lanes)
-        Range errors that remain at the nodes [m], and their changes if the point moves a metre east and a metre
-        north. [m/m]
+        Range errors that remain at the nodes [m], and their changes if the ground point moves a metre east and a
+        metre north. [m/m]
     looks : (2, 2, nodes, lanes)
         Horizontal components of the unit vectors to the platforms, by axis and platform.
     distances : (2, nodes, lanes)
@@ -966,12 +987,12 @@ class _GroundView:
     slope : (2, lanes)
         Half the slope of V, east and north. [m]
     matrix : (2, 2, lanes)
-        The matrix H.
+        The matrix H of the module docstring.
     determinant : (lanes,)
         Determinant of H.
     node_weights : (nodes, lanes)
-        Weights at the nodes that give the scalar product ⟨a, ρ⟩ of V for a history a: the sum of the weights times a
-        over the nodes is the scalar product with the range error ρ at the point.
+        Weights at the nodes for the scalar product ⟨a, ρ⟩ of the module docstring, with the range error ρ at the
+        point. The scalar product with a history a is the sum over the nodes of the weights times a.
     bends : three of (lanes,)
         Half the second derivatives of V at the points: east-east, east-north, north-north.
     """
@@ -993,13 +1014,15 @@ class _GroundView:
 
     @property
     def variance(self) -> Floats:
-        """Value of V at the points, (lanes,). [m²]"""
+        """Variance V, which the image point minimises, at the point of each lane, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
 
     def products(self, values: Floats) -> Floats:
-        """Scalar products ⟨g, a⟩ of V for histories a at the nodes, (2, lanes).
+        """Scalar products ⟨g, a⟩ of the range gradient g with error histories a over the aperture, (2, lanes).
 
-        g is the change of the range error per metre east (first row) and per metre north (second row).
+        `values` (nodes, lanes) holds the histories a at the nodes. A lane is one error of one case. g is the change
+        of the range error per metre east (first row) and per metre north (second row). The scalar product ⟨a, c⟩ is
+        defined in the module docstring.
         """
         return np.asarray(np.einsum("anc,nc->ac", self._weighted[1:], self._centred @ values))
 
@@ -1017,7 +1040,10 @@ class _GroundView:
 
 
 def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
-    """Step that brings half the slope of V to zero, by `bends`, half the second derivatives of V, (2, lanes). [m]"""
+    """Step that brings half the slope of V to zero, (2, lanes). [m]
+
+    `bends` are half the second derivatives of V, and `slope` is half the slope.
+    """
     (xx, xy, yy), (x, y) = bends, slope
     return np.asarray((xy * y - yy * x, xy * x - xx * y) / (xx * yy - xy * xy))
 
@@ -1025,11 +1051,11 @@ def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
 def _unresolved(
     orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
-    """Hidden phase and rms phase beyond the cubic, computed from a range error at the displaced point. [rad]
+    """Hidden phase, and rms of the phase beyond the cubic phase, from a range error at the displaced point. [rad]
 
-    `orders` are the Legendre orders 0 to 3 of the range error at the aperture edge. [m] `squares` are the mean square
-    of the range error and the mean square of its part beyond order 3. [m²] The other parameters are attributes of
-    `ExactRanges`.
+    `orders` [m] are the Legendre parts of orders 0 to 3 of the range error, given by their values at the aperture
+    edge. `squares` [m²] are the mean square of the range error and the mean square of its part beyond order 3. The
+    other parameters are attributes of `ExactRanges`.
     """
     _, slope, _, cubic = orders
     square, beyond_cubic = squares
@@ -1047,8 +1073,8 @@ def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Float
 
     `point` is (2, lanes), east and north. `measured` are the arrays that `ExactRanges._measured` prepares. Returns
     three views of the work arrays `room`. The first is the difference of the ranges, (2, nodes, lanes). The second
-    are the horizontal vectors from the points to the platforms, (2, 2, nodes, lanes), by axis and platform.
-    The third are the measured ranges, (2, nodes, lanes). All are in metres.
+    has the horizontal vectors from the points to the platforms, (2, 2, nodes, lanes), by axis and platform. The third
+    has the measured ranges, (2, nodes, lanes). All are in metres.
     """
     (p, true_range, squared_range), over_ground, point = measured[2:], measured[:2], point[:, None, None]
     looks, both, grown, distances = room[:2], room[2:4], room[4], room[5]
@@ -1064,14 +1090,14 @@ def _grown(measured: Floats, point: Floats, room: Floats) -> tuple[Floats, Float
 
 
 def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -> ImagePoints:
-    """Find where errors of any form over time displace the scene centre, if necessary by increasing them in steps.
+    """Find the points to which errors with any time history displace the scene centre.
 
     Parameters
     ----------
     exact : ExactRanges
         Exact ranges of the cases.
     clock : (nodes, lanes)
-        Range errors by clocks; they are zero if the direct path is the clock. [m]
+        Range errors due to clocks; zero if the direct path is the clock. [m]
     shifts : sequence
         For each platform, its shifts east, north and up, each (nodes, lanes). [m]
     case : (lanes,)
@@ -1080,9 +1106,10 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
     Returns
     -------
     ImagePoints
-        Image points and remaining phases. They are NaN if no ground point has the recorded range history, or if the
-        image point does not reach this ground point while the error grows to its full size. As in `point_paths`, no
-        point has the history if the hidden phase exceeds half a cycle and the determinant of H is small.
+        Image points and remaining phases. If a search does not converge, the error is increased to its full size in
+        steps. The values are NaN if no ground point has the recorded range history, or if the image point does not
+        reach such a ground point as the error grows. As in `point_paths`, no point has the history if the hidden
+        phase exceeds half a cycle and the determinant of H is small.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in POINT_SETTINGS.course_steps:
@@ -1106,13 +1133,13 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
 
 
 def _within_ends(points: ImagePoints) -> ImagePoints:
-    """Replace points that lie beyond the end of their path (see `point_paths`) by NaN; they are not settled."""
+    """Replace points beyond the end of their path (see `point_paths`) by NaN, and mark them as not settled."""
     is_gone = (np.abs(points.turn) < POINT_SETTINGS.folded_fraction) & (points.hidden > POINT_SETTINGS.end_rad)
     return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
 def _take(arrays: Sequence[Floats] | Floats, indices: Indices) -> list[Floats]:
-    """Select lanes of arrays (…, lanes). An array that all lanes share stays as it is."""
+    """Select lanes of arrays (…, lanes); an array with a single lane, valid for all lanes, is returned unchanged."""
     return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 

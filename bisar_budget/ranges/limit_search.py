@@ -1,9 +1,9 @@
 """Search for the smallest size at which an error reaches a limit, along the path of the image point.
 
-A search works with the square of a phase or displacement divided by the square of its limit, because the square is a
-smooth function of the size and the magnitude is not. After each step the search uses all known points of the path. It
-ends if an interpolated point is close enough to the limit, and if no local maximum at a smaller size may exceed the
-limit. All searches take their steps at the same time.
+A search works with the squared ratio of a phase or displacement to its limit. The square is used because it is a
+smooth function of the size, and the magnitude is not. After each step the search uses all known points of the path.
+It ends if an interpolated point is close enough to the limit, and if a local maximum above the limit is not possible
+at any smaller size. All searches take their steps at the same time.
 """
 
 import math
@@ -41,18 +41,20 @@ class SearchSettings:
         applies where the value is almost linear in the size, the second where its slope changes by more than
         `bent_fraction` within the interval.
     bent_fraction : float
-        Change of a slope within an interval above which the interval counts as bent, as a fraction of the slope.
+        Threshold for the change of the slope within an interval, as a fraction of the slope. An interval with a
+        larger change counts as bent.
     crest_fraction : float
         Tolerance below the limit, as a fraction of the limit. A local maximum of an interpolation within this
         tolerance counts as possibly above the limit.
     departure_fraction : float
-        Largest difference between the rise over an interval and the rise that the slope at its lower end predicts, as
-        a fraction of the limit. If the difference is larger, the search also tries a size within the interval.
+        Largest accepted departure from linearity within an interval, as a fraction of the limit. The departure is the
+        difference between the rise over the interval and the rise predicted from the slope at its lower end. If the
+        departure is larger, the search also tries a size within the interval.
     trusted_interval_fraction : float
         Largest width of an interval within which an interpolation is trusted, as a fraction of the size.
     steep_ratio : float
-        Squared ratio of a value to its limit. Above it, a power law in the size predicts the limit better than a
-        cubic.
+        Threshold for the squared ratio of a value to its limit. Above it, the size at the limit is predicted by a
+        power law, which is then more accurate than a cubic.
     growth_factor : float
         Factor by which the size grows in a step.
     newton_steps : int
@@ -99,15 +101,14 @@ class LimitSearches:
         Factor by which autofocus raises the limit of the quadratic phase. It does not raise the limit of the hidden
         phase.
     first : (searches,)
-        Size that is tried first: the size at which the limit is reached if the effect is proportional to the size.
-        [unit]
+        Size that is tried first. At this size an effect that is proportional to the size reaches the limit. [unit]
     largest : (searches,)
         Size at which the search ends. [unit]
     group : (searches,)
         Group of each search. A search ends at the smallest size that a search of its group has found.
     is_alone : (searches,)
-        If True, only a search of the group for the same requirement can end the search. If False, any search of the
-        group can.
+        If True, the search can be ended only by a search of its group for the same requirement. If False, it can be
+        ended by any search of its group.
     """
 
     lane: Indices
@@ -171,7 +172,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
 
 
 class _SearchState:
-    """Results and next steps of searches, computed from the known points of the paths.
+    """State of searches, computed from the known points of the paths: results so far, and next steps.
 
     Attributes
     ----------
@@ -224,7 +225,7 @@ class _SearchState:
     def _doubtful_sizes(self, first_above: Indices) -> Floats:
         """Size to try next within each interval between known points below the limit, (searches, intervals). [unit]
 
-        The size is NaN where no value within the interval can exceed the limit.
+        The size is NaN for an interval in which the value cannot exceed the limit.
         """
         low, width = self.size[:, :-1], self.width
         start, stop = self.square[:, :-1], self.square[:, 1:]
@@ -243,7 +244,7 @@ class _SearchState:
         return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
 
     def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Booleans]:
-        """Size at which a cubic between known points reaches the limit, and whether it is accurate enough."""
+        """Sizes at which cubics between known points reach the limits, and whether each size is accurate enough."""
         high = np.minimum(first_above, self.size.shape[1] - 1)
         low = high - 1
         width, self.high = self.width[every, low], self.size[every, high]
@@ -275,10 +276,10 @@ class _SearchState:
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
     def _by_power(self, every: Indices, low: Indices, high: Indices) -> Floats:
-        """Size at which a power law in the size, fitted to two known points, reaches the limit.
+        """Sizes at which power laws, each fitted to two known points of a path, reach the limits.
 
-        The points are those on both sides of the limit. If the lower of these is the start of the path, the two
-        points above the limit are used.
+        The two points are the last known point below the limit and the first above it. If the lower point is the
+        start of the path, the first two points above the limit are used instead.
         """
         after = np.minimum(high + 1, self.count - 1)
         is_start = low == 0
@@ -288,7 +289,7 @@ class _SearchState:
         return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
 
     def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Booleans]:
-        """Size at which a parabola through the last points reaches the limit, and whether it is accurate enough."""
+        """Sizes at which parabolas through the last known points reach the limits, and whether each is accurate."""
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]
         bend = np.where(last > 0, (slope - self.slope[every, before]) / self.width[every, before], 0.0)
@@ -305,7 +306,7 @@ class _SearchState:
         return ahead, is_close
 
     def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
-        """Choose the error sizes to try next; return indices of searches and a size for each, (tries,) each.
+        """Choose the error sizes to try next; return the indices of the searches and the sizes, both (tries,).
 
         `going` are the indices of the unfinished searches. One size is tried per lane, or several if `is_several`.
         """
@@ -343,7 +344,8 @@ class _SearchState:
 def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, slope_high: Floats) -> Floats:
     """Value of a cubic at a position from 0 to 1 within an interval.
 
-    `start` is its value at 0, `rise` its increase from 0 to 1. The slopes are those at 0 and at 1.
+    `start` is the value of the cubic at 0, and `rise` its increase from 0 to 1. `slope_low` and `slope_high` are its
+    slopes at 0 and at 1.
     """
     square, cube = position**2, position * position * position
     height = start + slope_low * (position - 2 * square + cube) + slope_high * (cube - square)
@@ -351,9 +353,9 @@ def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, 
 
 
 def _crests(slope_low: Floats, rise: Floats, slope_high: Floats) -> tuple[Floats, Floats]:
-    """Positions, in units of an interval, at which the cubic of `_on_cubic` has zero slope.
+    """Positions at which the slope of the cubic in `_on_cubic` is zero; the interval extends from 0 to 1.
 
-    They are not finite if there is no such position.
+    If the slope is never zero, the positions are not finite.
     """
     b, c = 3 * rise - 2 * slope_low - slope_high, slope_low + slope_high - 2 * rise
     far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope_low), b))

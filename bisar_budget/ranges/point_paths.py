@@ -2,12 +2,12 @@
 
 A path is the position of the image point as a function of the size of an error. It starts at the scene centre, at
 size 0. It ends where the hidden phase exceeds π and the root of the determinant of H is less than a fifth of its
-value at the centre (see `exact_ranges` for both). For a larger error, no ground point has the recorded range history.
-Near a fold the gradients of range and Doppler are almost parallel, and the determinant of H is small. If the hidden
-phase does not exceed π at a fold, the path continues. If the peak on the path fades into a wider peak there, the path
-continues from the wider peak.
+value at the centre (see `exact_ranges` for both). For any larger error, no ground point has the recorded range
+history. Near a fold the gradients of range and Doppler are almost parallel, and the determinant of H is small. If the
+hidden phase does not exceed π at a fold, the path continues. If the peak on the path fades into a wider peak there,
+the path continues from the wider peak.
 
-A lane is one error of one case. All lanes take their steps at the same time. If there are only a few lanes, each
+A lane is one error of one case. All lanes take their steps at the same time. If there are only a few lanes, each lane
 tries several sizes in one step, because this adds little computing time. `ranges.limit_search` finds the first size
 at which a path reaches a limit.
 """
@@ -41,8 +41,8 @@ class PathSettings:
     stray_m : float
         Distance that is allowed in addition to `stray_fraction`, because steps may have almost no length. [m]
     fade_fraction : float
-        Largest distance between a peak that is lost at a fold and the peak into which it fades, as a fraction of the
-        displacement.
+        Largest distance from a peak that is lost at a fold to the wider peak into which it fades, as a fraction of
+        the displacement.
     straight_fraction : float
         Largest deviation of an almost straight path, as a fraction of the displacement.
     finest_step_fraction : float
@@ -52,14 +52,14 @@ class PathSettings:
     least_fold_fraction : float
         Smallest trusted distance to a predicted fold, as a fraction of the last step.
     end_fraction : float
-        Half width of an interval that contains the end of a path, as a fraction of the size. Linear interpolation
-        within the interval is then accurate to 1e-9.
+        Largest half width of an interval within which the end of a path is interpolated, as a fraction of the size.
+        With this width, linear interpolation is accurate to 1e-9.
     early_fraction : float
         Size at which the curvature of a path at its start is measured, as a fraction of the first size that is tried.
     same_size_fraction : float
-        Difference between two sizes below which they count as equal, as a fraction of the size.
+        Largest difference between two sizes that count as equal, as a fraction of the size.
     few_lanes_count : int
-        Number of lanes below which a step tries several sizes per lane.
+        A step tries several sizes per lane if there are fewer lanes than this number.
     """
 
     stray_fraction: float = 0.15
@@ -96,9 +96,9 @@ class PointPaths:
     exact : ExactRanges
         Exact ranges of the cases.
     lanes : Lanes
-        The errors. Each sign of an error is a lane of its own.
+        The errors. The two signs of an error are two separate lanes.
     per_unit : (2, lanes)
-        Displacement east and north by a small unit of each error. [m/unit]
+        Displacement east and north per unit of each error, if the error is small. [m/unit]
     is_alike : bool
         Whether to try several sizes per lane for any number of lanes. The results of a case then do not depend on the
         number of cases.
@@ -122,16 +122,17 @@ class PointPaths:
         self._missed_ever = np.zeros(lane_count, dtype=bool)  # if so, the path's start predicts no point
 
     def known(self, lane: Indices, size: Floats) -> Floats:
-        """Known point of each path at a given size, with the rows of `ROWS`, (rows, lanes).
+        """Known point of each path at a given error size, (rows, lanes).
 
-        `follow_to` must have reached the sizes before. The values are NaN beyond the end of a path.
+        `ROWS` lists the rows. `follow_to` must have reached the sizes before. The values are NaN beyond the end of a
+        path.
         """
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
         return points
 
     def _point(self, lane: Indices, index: Indices) -> Floats:
-        """Known point of each lane at the position `index` in the lane's list, (rows, lanes)."""
+        """Known point of each path by its position `index` in the lane's list of known points, (rows, lanes)."""
         return np.asarray(self.known_points[:, lane, index])
 
     # ---------------------------------------------------------------- steps
@@ -146,9 +147,9 @@ class PointPaths:
             self.step_toward(lane, size)
 
     def step_toward(self, lane: Indices, size: Floats) -> None:
-        """Make one step along the paths toward each size, from the last known point below it.
+        """Make one step along the path of each lane toward a size, from the last known point below this size.
 
-        The same lane may occur several times.
+        The same lane may occur several times, with different sizes.
         """
         lane, index, size, to_fold = self._sizes_of_step(lane, size)
         last = self._point(lane, index)
@@ -202,7 +203,7 @@ class PointPaths:
         """Choose the error sizes that the next step of each lane tries.
 
         Returns four arrays (tries,), sorted by lane and size: the lane, the index of its last known point at a
-        smaller size, the size to try, and the increase in size from that point to a fold.
+        smaller size, the size to try, and the increase in size from that point to the next fold.
         """
         index = (self.known_points[SIZE, lane] < size[:, None]).sum(axis=1) - 1
         last = self._point(lane, index)
@@ -230,9 +231,9 @@ class PointPaths:
     def _shorten_step(
         self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Booleans
     ) -> None:
-        """Shorten the next step of lanes whose step missed, or record the end of their paths.
+        """Shorten the next step on paths whose last step missed, or record the end of these paths.
 
-        A step misses if it finds no point on the path or a point beyond the end of the path.
+        A step misses if it does not find a point on the path, or if the point lies beyond the end of the path.
         """
         end = _end_between(before, point)
         halved = np.maximum((point[SIZE] - before[SIZE]) / 2, reached)
@@ -264,7 +265,7 @@ class PointPaths:
 
     # ---------------------------------------------------------------- predictions
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
-        """Increase of an error's size from its last known point to the next fold; infinite if none is ahead. [unit]
+        """Increase of an error's size from its last known point to the next fold; infinite without a fold. [unit]
 
         At a fold the range and Doppler gradients are parallel, and the determinant of H is zero. A parabola through
         the determinants (squared areas) at the last three known points is extrapolated to zero.
@@ -307,8 +308,8 @@ class PointPaths:
     ) -> tuple[Floats, Floats]:
         """Predict the image points from the slopes of the path at the last two known points, east and north. [m]
 
-        The slope is assumed to change linearly with the size or, near a fold, with the root of the distance to the
-        fold.
+        The slope is assumed to be a linear function of the error size. Near a fold it is assumed to be a linear
+        function of the square root of the distance to the fold.
         """
         before = self._point(lane, np.maximum(index - 1, 0))
         slopes = self._slopes_at(np.tile(lane, 2), np.concatenate((last, before), axis=1))
@@ -331,7 +332,7 @@ class PointPaths:
 
 
 def _begins(values: Indices) -> Booleans:
-    """Whether each value differs from the value before it; the first one does."""
+    """Whether each value differs from the previous value; True for the first value."""
     begins = np.ones(values.size, dtype=bool)
     begins[1:] = values[1:] != values[:-1]
     return begins
@@ -346,7 +347,7 @@ def _is_near(last: Floats, point: Floats, expected: tuple[Floats, Floats]) -> Bo
 
 
 def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Extrapolate paths to the sizes `size` by a parabola through three points of each, east and north. [m]
+    """Extrapolate paths to the error sizes `size`, each by a parabola through three points, east and north. [m]
 
     Where `far` and `middle` are the same point, a straight line is used instead.
     """
@@ -364,8 +365,8 @@ def _end_between(before: Floats, beyond: Floats) -> Floats:
     """Size at which the path ends, between a point before and a point beyond the end. [unit]
 
     The path ends where two conditions are met: the determinant of H is small, as near a fold, and the hidden phase
-    exceeds π. For each condition, the size at which it begins is found by linear interpolation: of the determinant
-    and of the hidden phase.
+    exceeds π. The size at which each condition is first met is found by linear interpolation of the determinant or of
+    the hidden phase.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
     to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)

@@ -1,13 +1,14 @@
-"""Resolution on the ground: widths of the response to a point without errors, from band and aperture.
+"""Resolution on the ground: widths of the error-free point response, computed from band and aperture.
 
 A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c. Here g is the sum of
-the horizontal components of both lines of sight. The vectors 2πf·g/c are the wave-number support. The response to a
-step is the mean of e^(i·phase) over the support. The cross-range width is the width along the line of equal range at
-mid-aperture. The range width is the width along the conjugate direction, in which the phase of a step is not
-correlated with the phase of a step along the line. It is given as the distance across the line. For a short aperture
-the conjugate direction is the line of equal Doppler, and the support is a parallelogram. First nulls then lie at
-c/(B|s|) and λ/(T|ṡ⊥|), with s the value of g at mid-aperture and ṡ⊥ the part of its rate across s. The width at half
-power is 0.886 of that.
+the horizontal components of both lines of sight. The vectors 2πf·g/c are the wave-number support. The response at the
+distance of a step from the peak is the mean of e^(i·phase) over the support. The cross-range width is the width along
+the line of equal range at mid-aperture. The range width is the width along the conjugate direction, in which the
+phase of a step is not correlated with the phase of a step along this line. The range width is given as a distance
+perpendicular to the line. For a short aperture the conjugate direction is the line of equal Doppler, and the support
+is a parallelogram. The first nulls then lie at c/(B|s|) and λ/(T|ṡ⊥|). Here s is the value of g at mid-aperture, and
+ṡ⊥ is the component of its rate perpendicular to s. The full width at half power is 0.886 times the distance to the
+first null.
 """
 
 import math
@@ -36,9 +37,9 @@ _MAX_CASE_COUNT = 64  # cases in one block of samples
 class Resolution(NamedTuple):
     """Range and cross-range widths of the response on the ground, to the first null and at half power. [m]
 
-    `range` and `cross_range` are the distances from the peak to the first null, and the other two are full widths at
-    half power. If the support is not a parallelogram, the response may have no null. The distance to the first
-    minimum is then used.
+    `range` and `cross_range` are the distances from the peak to the first null. `range_half_power` and
+    `cross_range_half_power` are full widths at half power. If the support is not a parallelogram, the response may
+    have no null. The distance to the first minimum is then used.
     """
 
     range: PerCase
@@ -73,11 +74,11 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
 
 
 def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
-    """Size of the resolution cell along each of several axes; samples at this spacing represent the response. [m]
+    """Size of the resolution cell along each of several axes. [m]
 
-    `axes` (2, axes) are unit vectors on the ground. `sight` (times, 2) are the horizontal components of the sum of
-    both lines of sight. The cell is the inverse of the extent of the wave-number support along the axis, including
-    the corners of the support.
+    Samples at this spacing represent the response fully. `axes` (2, axes) are unit vectors on the ground. `sight`
+    (times, 2) are the horizontal components of the sum of both lines of sight. The cell is the inverse of the extent
+    of the wave-number support along the axis, including the corners of the support.
     """
     band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
     extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
@@ -85,7 +86,7 @@ def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
 
 
 def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Booleans:
-    """Whether the support is close enough to a parallelogram for the closed formulas of the widths."""
+    """Whether the wave-number support is close enough to a parallelogram for the closed formulas of the widths."""
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
@@ -95,7 +96,8 @@ def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, acro
 def _slopes(geometry: BistaticGeometry, half: Floats, indices: Indices, count: int) -> Floats:
     """Horizontal components of the sum of both lines of sight at `count` nodes, (2, nodes, cases).
 
-    The cases are those with the indices `indices`. `half` is half the aperture time of all cases. [s]
+    The result covers only the cases in `indices`. `half` [s] has half the aperture time of every case, including
+    cases that are not in `indices`.
     """
     slopes = np.zeros((2, count, indices.size))
     for path in geometry.both:
@@ -119,7 +121,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
     moments = mean[:, None] * rates ** np.arange(3)[:, None, None]
 
     def power(step: Floats) -> tuple[Floats, Floats, Floats]:
-        """Power of the response at a step from the peak, and its first two derivatives."""
+        """Power of the response at a distance `step` from the peak, and its first two derivatives."""
         value, slope, bend = np.einsum("knc,nc->kc", moments, np.exp(1j * rates * step))
         slope, bend = 1j * slope, -bend
         first = 2 * (value.conj() * slope).real

@@ -1,9 +1,10 @@
-"""Write findings as text. The table of formats names the module of each format; its functions are pure.
+"""Write findings in a report format. `FORMATS` lists the formats and the module of each.
 
-The module of a format NAME has a function `as_NAME(report, style) -> str`, such as `as_sarif`. A format with
-`is_piecewise` is written mission by mission. Its module has two functions instead, `piece(mission, style) -> str` and
-`joined(pieces, version, style) -> str`, so that a process that checks a mission can write its piece and discard the
-findings. A format with `has_pictures` also has a function `pictures(report, style)`.
+The functions of these modules are pure. The module of a format NAME has a function `as_NAME(report, style) -> str`,
+such as `as_sarif`. A format with `is_piecewise` is written mission by mission, and its module has two other functions
+instead: `piece(mission, style) -> str` and `joined(pieces, version, style) -> str`. A process that has checked a
+mission can then write the piece about this mission, and discard the findings. If a format has `has_pictures` set, its
+module also has a function `pictures(report, style)`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,12 +18,12 @@ if TYPE_CHECKING:
 
 
 class Format(NamedTuple):
-    """A report format: the module in this package that writes it, and the endings of its file names.
+    """A report format, with the module that writes it and the endings of its file names.
 
-    The usual ending is first. `about` is the description of the format in `--help`. The docstring of this module
-    explains `is_piecewise` and `has_pictures`. If `is_binary` is set, the files of the format are not text. If
-    `is_illustrated` is set, the writer needs the mission and the images of verified limits, which are not kept in
-    memory for other formats.
+    The most usual ending comes first. `about` is the description of the format in `--help`. The docstring of this
+    module explains `is_piecewise` and `has_pictures`. If `is_binary` is set, the files of the format are not text. If
+    `is_illustrated` is set, the mission and the images of verified limits are kept in memory for the writer; they are
+    discarded for all other formats.
     """
 
     name: str
@@ -67,7 +68,7 @@ FORMATS = {entry.name: entry for entry in _FORMAT_ENTRIES}
 
 
 def format_of(name: str) -> str | None:
-    """Find the report format for a file name such as `budget.sarif` or `needs.json`; None if there is none."""
+    """Find the report format for a file name such as `budget.sarif` or `needs.json`; None if no format fits."""
     # With the dot before it, the name `needs.json` ends like `x.needs.json`.
     ending = "." + name.replace("\\", "/").rpartition("/")[2].lower()
     if ending.count(".") == 1:
@@ -81,9 +82,9 @@ def format_of(name: str) -> str | None:
 class Style(NamedTuple):
     """Settings of a report: verbosity, colour, table width and folders.
 
-    Machine-readable formats ignore the first three. They write the path of a file relative to the root of its
-    repository (`report.words.identity`), else relative to `root`. Pictures are in the folder `assets` beside the
-    report. If `assets` is empty, the report has no pictures.
+    Machine-readable formats ignore verbosity, colour and table width. They write the path of a file relative to the
+    root of its repository (see `report.words.identity`), or relative to `root` if there is no repository. Pictures
+    are stored in the folder `assets` beside the report. If `assets` is empty, the report has no pictures.
     """
 
     color: bool = False
@@ -96,17 +97,17 @@ class Style(NamedTuple):
     table_width: int = 80  # columns of a table for a terminal, which has a row on one line if it fits
 
     def coloured(self, text: str, sgr: str) -> str:
-        """Put text between the SGR escape sequence `sgr` (ECMA-48) and a reset, if the style has colour."""
+        """Enclose text in the SGR escape sequence `sgr` (ECMA-48) and a reset, unless the style has no colour."""
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
 def _module(format_name: str) -> "ModuleType":
-    """Return the module of a format. It is imported at its first use, so that other formats load faster."""
+    """Import the module of a format at its first use, so that other formats load faster, and return it."""
     return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 
 
 def render(format_name: str, report: "Report", style: Style) -> str:
-    """Write a report in a format of `FORMATS` that is text; the text ends with a newline."""
+    """Write a report in one of the text formats of `FORMATS`; the text ends with a newline."""
     if FORMATS[format_name].is_piecewise:
         pieces = [piece(mission, format_name, style) for mission in report.missions]
         return joined(format_name, pieces, report.version, style)
@@ -131,8 +132,8 @@ def content(format_name: str, report: "Report", style: Style) -> bytes:
 class Piece(NamedTuple):
     """Text of one mission in a format that is written mission by mission.
 
-    `unusable` holds the faults of the mission file if it is unusable, and is None otherwise. `statuses` are the
-    statuses of all rows and requirements; `status` is the worst of them.
+    If the mission file is unusable, `unusable` has its faults; otherwise it is None. `statuses` are the statuses of
+    all rows and requirements; `status` is the worst of these statuses.
     """
 
     status: str
@@ -142,7 +143,7 @@ class Piece(NamedTuple):
 
 
 def piece(mission: "MissionFindings | UnusableMission", format_name: str, style: Style) -> Piece:
-    """Write one mission in a format that is written mission by mission."""
+    """Write the piece for one mission of a report in a piecewise format."""
     from bisar_budget.findings.mission import UnusableMission
 
     text: str = _module(format_name).piece(mission, style)
@@ -150,13 +151,13 @@ def piece(mission: "MissionFindings | UnusableMission", format_name: str, style:
 
 
 def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write a report from its pieces. The text is the same as from `render`."""
+    """Join the pieces of all missions into a report; the result is the same as from `render`."""
     text: str = _module(format_name).joined(pieces, version, style)
     return text
 
 
 def pictures(format_name: str, report: "Report", style: Style) -> Mapping[str, bytes]:
-    """Contents of the picture files of a report, by their names within `style.assets`; empty if it has none."""
+    """Contents of the picture files of a report, by their names in `style.assets`; empty if there are no pictures."""
     if not FORMATS[format_name].has_pictures or not style.assets:
         return {}
     files: Mapping[str, bytes] = _module(format_name).pictures(report, style)

@@ -1,7 +1,7 @@
 """An answer as data: chapters with blocks of text, tables and pictures, independent of the output format.
 
-The modules of `renderers/` write a document for a terminal, as Markdown, as HTML and as a workbook. Its texts are
-plain, and each renderer escapes them.
+The modules of `renderers/` write a document for a terminal, as Markdown, as HTML and as a workbook. The texts of a
+document are plain text, which each renderer escapes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,9 +16,9 @@ from bisar_budget.report.words.sentences import sentence
 # ---------------------------------------------------------------------- text of a line
 @dataclass(frozen=True, slots=True)
 class Name:
-    """An id or a file path as text, which may be broken into lines if it is long.
+    """An id or a file path. If it is long, it may be broken across lines.
 
-    `target` is the anchor of the place to which it links.
+    `target` is the anchor of the place to which the text links.
     """
 
     text: str
@@ -27,10 +27,10 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Styled:
-    """Text with a class of the style sheet. If the text fills a table cell, the cell also gets the class.
+    """Text with a class of the style sheet. If the text is a whole table cell, the cell also gets the class.
 
-    Markdown puts text of the classes `own-id` and `origin` in brackets, and text of the class `own-text` behind a
-    colon.
+    In Markdown, text of the classes `own-id` and `origin` is written in brackets, and text of the class `own-text` is
+    written after a colon.
     """
 
     style: str
@@ -45,13 +45,13 @@ class Badge:
 
     @property
     def words(self) -> str:
-        """The word that a page shows for the status or the verdict."""
+        """Word that is displayed for the status or the verdict."""
         return STATUS[self.status].words if self.status in STATUS else self.status
 
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """A bar that shows a utilization, with a mark at the limit; without a utilization the bar is empty."""
+    """A bar that shows a utilization, with a mark at the limit; the bar is empty if there is no utilization."""
 
     fraction: float | None
     status: str
@@ -59,7 +59,7 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar that shows a fraction of the whole, in the colour of the platform or clock that owns it."""
+    """A bar that shows a fraction of the whole, in the colour of a platform or the clock."""
 
     fraction: float
     owner: str
@@ -67,9 +67,9 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Swatch:
-    """Colour key for the share of an owner (a platform or the clock) in a `Stack`.
+    """Colour key for the share of a platform or the clock in a `Stack`.
 
-    Markdown cannot show a stack, so it shows the fraction as a bar instead.
+    Markdown has no stack. Each fraction is therefore shown as a bar instead.
     """
 
     owner: str
@@ -78,7 +78,7 @@ class Swatch:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Text for the reader to type, such as a command."""
+    """Text to be typed by the reader, such as a command."""
 
     text: str
 
@@ -100,8 +100,8 @@ def listed(names: Sequence[str]) -> Text:
 class Paragraph:
     """A paragraph of sentences. If it ends with a colon, it introduces the table below it.
 
-    `style` is a class of the style sheet: classes that begin with `verdict` mark verdicts, `command` marks a command
-    to copy.
+    `style` is a class of the style sheet. Classes whose names begin with `verdict` are for verdicts, and the class
+    `command` is for a command that the reader may copy.
     """
 
     text: Text
@@ -110,7 +110,7 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """A list of named values. A value without a name belongs to the name above it."""
+    """A list of names with values. A value without a name belongs to the previous name."""
 
     pairs: Sequence[tuple[Text, Text]]
     style: str = "facts"
@@ -145,33 +145,34 @@ class Head:
 
 
 def page_head(head: Head) -> Text:
-    """Text of a column head on a page, which begins with a capital letter, unless it is a key, and has its unit."""
+    """Text of a column head on a page, with the unit. It begins with a capital letter, unless it is a key."""
     text = sentence(head.text) if isinstance(head.text, str) else head.text
     return (text, f" [{head.unit}]") if head.unit else text
 
 
 def page_cell(text: Text) -> Text:
-    """Text of a table cell on a page, where a missing value is a dash instead of a hyphen."""
+    """Text of a table cell on a page, in which a missing value is shown as a dash instead of a hyphen."""
     return "–" if text == "-" else text
 
 
 def heads(*heads: Head | str) -> list[Head]:
-    """Make a list of column heads. A plain string becomes the head of a column of text."""
+    """Make a list of column heads; a plain string becomes the head of a text column."""
     return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
 def numbers(*heads: str, medium: str = "") -> list[Head]:
-    """Make the heads of columns of numbers, for one medium or for both."""
+    """Make the heads of number columns. The columns appear only in `medium`, or in both media if it is empty."""
     return [Head(head, "number", medium=medium) for head in heads]
 
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """The beginning of an answer: its verdict, the mission that it is about, and settings from outside the file.
+    """The beginning of an answer: its verdict, its mission, and settings from outside the mission file.
 
-    `status` is a key of `STATUS`; it gives the colour of the verdict. `more` are texts that belong to the verdict.
-    `file` includes the values that options replace, `terms` names the model and the like, and `overrides` are the
-    other settings from outside the file. On a page, the name of the mission is the title of the chapter.
+    `status` is a key of `STATUS`, and determines the colour of the verdict. `more` are further texts about the
+    verdict. `file` is a text with the path of the mission file, and with the options that changed its values. `terms`
+    states the conditions of the verdict, such as the model. `overrides` are further settings from outside the file.
+    On a page, the name of the mission is the title of the chapter.
     """
 
     verdict: str
@@ -183,7 +184,7 @@ class Opening:
     more: Sequence[str] = ()
 
     def page_blocks(self) -> "Iterator[Block]":
-        """Yield the blocks that a page has in place of the opening: the verdict, and named values below it."""
+        """Yield the blocks that replace the opening on a page: the verdict, followed by named values."""
         yield Paragraph(self.verdict, f"verdict {self.status}")
         for text in self.more:
             yield Paragraph(text)
@@ -195,7 +196,7 @@ class Opening:
 
 @dataclass(frozen=True, slots=True)
 class Only:
-    """Blocks that only one medium shows, `TERMINAL` or `PAGE`."""
+    """Blocks that appear in only one medium, `TERMINAL` or `PAGE`."""
 
     medium: str
     blocks: Sequence["Block"]
@@ -243,7 +244,7 @@ class TextTable:
     below: Sequence[Sequence[str]] = ()
 
     def on(self, medium: str) -> "TextTable":
-        """Return the table with the columns that `medium` shows."""
+        """Return the table with only the columns for `medium`."""
         shown = [head.medium in ("", medium) for head in self.heads]
         if all(shown):
             return self
@@ -255,7 +256,7 @@ class TextTable:
 class Stack:
     """A bar of the whole budget, divided into shares.
 
-    Each share has an owner (a platform or the clock), a fraction and a text. Markdown leaves the bar out.
+    Each share is given by its platform (or the clock), its fraction and a text. In Markdown, the bar is left out.
     """
 
     label: str
@@ -264,9 +265,9 @@ class Stack:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A drawing: `name` of its file, `anchor` of its mission, title, accessible label and SVG.
+    """A drawing: `name` of its file, `anchor` of its mission, a title, an accessible label, and SVG text.
 
-    `is_told` is True if the text beside the drawing describes it.
+    `is_told` is True if the surrounding text describes the drawing.
     """
 
     name: str
@@ -298,7 +299,10 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """An equation between two formulas of the catalogue, given by their names. It belongs to no row."""
+    """An equation between two formulas of the catalogue, which are given by their names.
+
+    The equation is general: it does not belong to a particular row.
+    """
 
     left: str
     right: str
@@ -306,7 +310,7 @@ class Equality:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The steps of a derivation, or other formulas with titles."""
+    """The steps of a derivation, or other formulas with titles above them."""
 
     label: str
     steps: Sequence[tuple[str, Sequence[WorkedEquation | str | Equality]]]
@@ -324,7 +328,10 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """A chapter: blocks below a heading. `short` is the title in the contents, `anchor` the target of links."""
+    """A chapter: blocks below a heading.
+
+    `short` is the title in the table of contents, and `anchor` is the target of links to the chapter.
+    """
 
     title: Text
     blocks: Sequence["Block"]
@@ -344,7 +351,7 @@ Block = Opening | OfMedium | Paragraph | Facts | Items | TextTable | Stack | Fig
 class Margins:
     """Texts for the page margins when a mission is printed.
 
-    They are the mission name, the document, and the digest or path of the mission file.
+    They are the name of the mission, the identification of the document, and the digest or path of the mission file.
     """
 
     anchor: str
@@ -355,7 +362,10 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class AnswerDocument:
-    """A whole answer. `subject` is the name of the mission or the number of missions, `title` the kind of answer."""
+    """A whole answer as a document.
+
+    `subject` is the name of the mission or the number of missions, and `title` states the kind of answer.
+    """
 
     version: str
     subject: str
@@ -366,7 +376,7 @@ class AnswerDocument:
 
 
 def blocks_of(block: AnswerDocument | Block) -> Iterator[Block]:
-    """Yield all blocks of a report or a block in order, including nested blocks."""
+    """Yield all blocks of a document or of a block in order, including nested blocks."""
     inner: Sequence[Block] = ()
     if isinstance(block, AnswerDocument):
         inner = block.chapters

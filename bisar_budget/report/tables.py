@@ -35,7 +35,7 @@ SWEEP_FORMAT = "bisar-budget/sweep/1"
 class Described:
     """A sweep with the columns and metadata of its table file.
 
-    Columns of varied keys are in the unit of the request. All further columns are in SI units.
+    Columns of varied keys have the units in which the sweep was requested. All further columns are in SI units.
     """
 
     def __init__(
@@ -56,14 +56,14 @@ class Described:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Columns of the table in the order of writing, with their units in the table."""
+        """Columns of the table in the order in which they are written, with their units in the table."""
         return tuple(
             column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
             for column in self.swept.columns
         )
 
     def values(self, block: Part) -> Mapping[str, Values]:
-        """Values of a block of cases by column name, converted from SI to the units of the columns."""
+        """Return the values of a block of cases by column name, converted from SI to the units of the columns."""
         return {name: self.converted(name, values) for name, values in block.values.items()}
 
     def converted(self, name: str, values: Values) -> Values:
@@ -74,14 +74,15 @@ class Described:
 
 
 def _overrides_text(overrides: Sequence[Override]) -> str:
-    """Write, on a single line, the overrides from outside the mission file that affect statuses."""
+    """Write the overrides (settings from outside the mission file that affect statuses) on one line."""
     return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
 def write_csv(described: Described, blocks: Iterable[Part], path: str) -> None:
-    """Write metadata as lines `# name: value`, a header `KEY [unit]`, and one line for each case.
+    """Write a CSV file: metadata as lines `# name: value`, a header with `KEY [unit]`, and one line for each case.
 
-    Numbers are written with all digits that are needed to reproduce them. A missing value is an empty cell.
+    Numbers are written with as many digits as are needed to read back the same value. A missing value is an empty
+    cell.
     """
     with open(path, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:
         file.writelines(texts(described, blocks))
@@ -106,7 +107,7 @@ def _quoted(text: str | None) -> str:
 def _cells(column: Column, values: Values) -> list[str]:
     """Write the values of a column as strings for CSV.
 
-    A value that several cases share is converted only once.
+    A value shared by several cases is converted only once.
     """
     if column.is_text:
         texts: list[str] = values.tolist()
@@ -121,7 +122,7 @@ def _cells(column: Column, values: Values) -> list[str]:
 
 
 def _number(number: float) -> str:
-    """Write a number with all digits that are needed to reproduce it; empty for NaN."""
+    """Write a number with as many digits as are needed to read back the same value; empty for NaN."""
     return repr(number) if number == number else ""
 
 
@@ -189,9 +190,9 @@ _EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> None:
     """Write a NetCDF file that follows the CF conventions.
 
-    A grid has one dimension for each key; a table has the dimension `case`. Strings are stored as flags, which are
-    numbers with a list of their meanings. Reasons are strings, because they may differ in every case. Missing numbers
-    are NaN.
+    If the cases form a grid, each varied key is a dimension; otherwise the only dimension is `case`. Strings are
+    stored as CF flags, which are numbers with a list of their meanings. Reasons are stored as strings, because every
+    case may have a different reason. Missing numbers are NaN.
     """
     from netCDF4 import Dataset
 
@@ -217,9 +218,9 @@ def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> Non
 
 
 def _hold_to_room(path: str) -> None:
-    """Append to a file that the library could not write.
+    """Append to a file that the library could not write, to learn the reason.
 
-    The operating system then raises an `OSError` with the reason, such as a full disk.
+    The operating system then raises an `OSError` that states the reason, such as a full disk.
     """
     with open(path, "ab") as file:
         file.write(bytes(_PROBE_BYTES))
@@ -228,7 +229,10 @@ def _hold_to_room(path: str) -> None:
 
 
 def _dimensions(file: "NetcdfFile", described: Described) -> list[Column]:
-    """Create the dimensions of a NetCDF file, and return the columns that have a value for each case."""
+    """Create the dimensions of a NetCDF file, and return the columns that are not dimensions.
+
+    These columns have a separate value for each case.
+    """
     cases = described.cases
     if not cases.is_grid:
         file.createDimension("case", cases.count)
@@ -302,10 +306,10 @@ def slabs(start: int, stop: int, shape: tuple[int, ...]) -> Iterator[tuple[slice
 
 
 class TableFormat(NamedTuple):
-    """A table format: the function that writes it, and the library of the extra `tables` that it needs.
+    """A table format: the function that writes it, and the library that it needs from the extra `tables`.
 
-    `write` writes a table part by part, and keeps only a few parts in memory. It raises `OSError` if it cannot write
-    the file.
+    `write` writes a table part by part, so that only a few parts are in memory. It raises `OSError` if it cannot
+    write the file.
     """
 
     name: str
@@ -348,15 +352,16 @@ def dataset(described: Described, values_by_column: "Mapping[str, Values | DaskA
     Parameters
     ----------
     described : Described
-        The table.
+        Sweep with the columns and metadata of its table.
     values_by_column : mapping
-        Values of each column by its name, (cases,): arrays of NumPy or of Dask.
+        Values of each column, by column name: NumPy or Dask arrays of shape (cases,).
 
     Returns
     -------
     xarray.Dataset
         A variable for each column, with `units` and `long_name`. Missing numbers are NaN, missing strings are empty.
-        Keys that vary are coordinates in the unit of the request. The attributes are the metadata of the table.
+        Varied keys are coordinates, in the units in which the sweep was requested. The attributes are the metadata of
+        the table.
 
     Raises
     ------

@@ -1,14 +1,14 @@
 """Random draws of independent errors, and counts of the draws that meet each requirement.
 
-For small errors the full model is linear: the effect of a draw is the sum of standard variables times their effects.
-A sample of draws is computed by exact ranges too. If the two results differ by more than 1 % of a limit, every draw
-is computed by exact ranges.
+For small errors the full model is linear: the effect of a draw is the sum of the effects of standardized random
+variables, each multiplied by the drawn value. A sample of draws is also computed from exact ranges. If the two
+results differ by more than 1 % of a limit, all draws are computed from exact ranges.
 
 Draws are divided into chunks of a fixed size. The random numbers of a chunk depend only on the seed, on the name of
-the variable and on the number of the chunk, so any process can make them. A chunk consists of one or more pieces.
-The result of a piece is a set of counts and sums of squared errors, and the sums of all pieces are added without
-rounding. The result of all draws therefore does not depend on which processes computed the pieces, or in which order.
-Memory does not grow with the number of draws.
+the variable and on the number of the chunk, so any process can generate them. A chunk is divided into one or more
+pieces. The result of a piece is a set of counts and sums of squared errors. The results of all pieces are added
+without rounding, so the total does not depend on which processes computed the pieces, or in which order. Memory does
+not grow with the number of draws.
 """
 
 import math
@@ -46,9 +46,9 @@ class Variable(NamedTuple):
     """One random variable with mean 0 and variance 1, and its effects.
 
     `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
-    variable causes. The size of each is given for a value of 1 of the variable, in the unit of the error. For random
-    errors `parts` is empty, because only their effects are known. `effects` are the quadratic and cubic phase at the
-    aperture edge [rad], and the displacement east and north [m], for a value of 1.
+    variable causes if its value is 1, each with its size in the unit of the error. For random errors `parts` is
+    empty, because only their effects are known. `effects` are the effects if the value is 1: the quadratic and cubic
+    phase at the aperture edge [rad], and the displacement east and north [m].
     """
 
     id: str
@@ -60,12 +60,13 @@ class Variable(NamedTuple):
 
 
 class HeldSum(NamedTuple):
-    """A requirement with which draws are compared: its limit, and the errors and effects that are summed for it.
+    """A requirement to be compared with draws: its limit, and the errors and effects that are summed for it.
 
-    `owners` are the owners of the summed errors. `columns` are the indices of the summed effects in
-    `Variable.effects`. `limit` is in `unit`. The limit of a quadratic phase error includes the `gain` of autofocus.
-    Autofocus does not correct the hidden phase, which is the part of the phase that the bandwidth and the turn of the
-    line of sight do not resolve. The hidden phase is therefore multiplied by `gain` before the comparison.
+    `owners` are the owners of the summed errors, such as `receiver` or `clock`. `columns` are the indices of the
+    summed effects in `Variable.effects`. `limit` is in `unit`. The limit of a quadratic phase error includes the
+    `gain` of autofocus. Autofocus does not correct the hidden phase, which is the part of the phase that the
+    bandwidth and the turn of the line of sight do not resolve. The hidden phase is therefore multiplied by `gain`
+    before the comparison.
     """
 
     id: str
@@ -77,7 +78,7 @@ class HeldSum(NamedTuple):
 
 
 class DrawsPiece(NamedTuple):
-    """A piece of the draws: the draws with the numbers `start` to `stop` - 1, all in one chunk."""
+    """A piece of the draws: the draws `start` to `stop` - 1, which are all in the same chunk."""
 
     start: int
     stop: int
@@ -86,8 +87,8 @@ class DrawsPiece(NamedTuple):
 class Drawing(NamedTuple):
     """All data that a process needs to compute pieces of the draws of a mission.
 
-    `name` is the name of the mission. `is_exact` states whether all draws are computed by exact ranges. `chunk` is
-    the number of draws in a chunk. Each variable has its own random stream in each chunk.
+    `name` is the name of the mission. `is_exact` states whether all draws are computed from exact ranges. `chunk` is
+    the number of draws in a chunk; in each chunk, each variable has its own random stream.
     """
 
     name: str
@@ -101,9 +102,9 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[DrawsPiece]:
-        """Divide the draws into pieces; the division is always the same.
+        """Divide the draws into pieces. The division is always the same for the same data.
 
-        Yields no pieces if there is no requirement to compare with.
+        No piece is yielded if there is no requirement to compare with.
         """
         size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
@@ -111,11 +112,11 @@ class Drawing(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Counts of draws, and sums of squared errors, in one piece of the draws.
+    """Counts of draws and sums of squared errors in one piece of the draws.
 
-    `holds` counts the draws that meet each requirement, and `all_hold` counts the draws that meet all requirements.
-    `imaged` counts the draws that have an image, and `squares` is the sum of the squared errors over these draws, for
-    each requirement.
+    For each requirement, `holds` is the number of draws that meet it, `imaged` is the number of draws that have an
+    image, and `squares` is the sum of the squared errors of the draws with an image. `all_hold` is the number of
+    draws that meet all requirements.
     """
 
     holds: tuple[int, ...]
@@ -127,18 +128,18 @@ class Tally(NamedTuple):
 def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
-    """Prepare the draws of a mission; a sample of draws decides whether all draws need exact ranges.
+    """Prepare the draws of a mission. A sample of draws decides whether all draws need exact ranges.
 
-    Variables without an effect on any requirement are left out.
+    Variables that do not affect any requirement are left out.
     """
     setting = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
     drawing = Drawing(*setting, draws, seed, False, CHUNK_DRAWS)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
-        """Whether a variable has an effect on any requirement.
+        """Whether a variable affects any requirement.
 
-        Other variables can be left out, because every variable has its own random stream.
+        A variable without an effect can be left out, because every variable has its own random stream.
         """
         if is_exact and variable.parts:
             return any(size for _, size in variable.parts)
@@ -148,11 +149,11 @@ def drawing_of(
 
 
 def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
-    """Join the tallies of all pieces, in any order; `count` is the number of requirements.
+    """Combine the tallies of all pieces, in any order; `count` is the number of requirements.
 
-    Returns three values: the number of draws that meet each requirement, the mean squared error of the draws with an
-    image for each requirement, and the number of draws that meet all requirements. A mean is NaN if no draw has an
-    image. Squares are added as fractions, without rounding.
+    Returns three values: for each requirement the number of draws that meet it; for each requirement the mean squared
+    error of the draws with an image, or NaN if no draw has an image; and the number of draws that meet all
+    requirements. Squared errors are added as fractions, without rounding.
     """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
@@ -170,14 +171,14 @@ Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every p
 
 
 def in_turn(drawing: Drawing) -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Draw all pieces in this process, one after the other, and yield each piece with its counts."""
+    """Draw all pieces in this process, one after the other, and yield each piece with its tally."""
     drawer = Drawer(drawing)
     for piece in drawing.pieces():
         yield piece, drawer.tally(piece)
 
 
 def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPiece, Tally]]:
-    """Draw the pieces on other workers, and yield each piece with its counts when it is done.
+    """Let other workers draw the pieces, and yield each piece with its tally as soon as it is finished.
 
     The pieces come in any order. `mapped` is the function that distributes them to the workers.
     """
@@ -188,7 +189,7 @@ def shared_out(drawing: Drawing, mapped: "MapBlocks") -> Iterator[tuple[DrawsPie
 def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
     """Draw the errors of one piece, and count the draws that meet the requirements.
 
-    The process needs no state from other pieces.
+    The result does not depend on pieces that this process drew before.
     """
     return Drawer(drawing).tally(piece)
 
@@ -196,12 +197,15 @@ def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
 class Sums:
     """Summed errors of one block of draws.
 
-    If `adds` is set, the quadratic phase is summed by owner and each further effect over the whole mission, and
-    `square` can be called. If `keeps_motion` is set, the errors are summed by owner for exact ranges, and
-    `exact_square` can be called. In this case `motion` holds position, velocity and acceleration errors of both
-    platforms, (2, 3, 3, draws). `tags` holds time tag errors of both platforms (2, draws), `registered` holds errors
-    of registered kinds with their sizes (draws,), and `clock` holds clock coefficients (4, draws). `alone` is for
-    errors of which only the effects are known: quadratic and cubic phase, and displacement east and north (4, draws).
+    If `adds` is true, the effects of the errors are summed: the quadratic phase for each owner, and each further
+    effect over the whole mission. `square` can then be called. If `keeps_motion` is true, the errors themselves are
+    summed for each owner, as input for exact ranges. `exact_square` can then be called.
+
+    In the second case there are the following arrays for each owner. `motion` (2, 3, 3, draws) holds position,
+    velocity and acceleration errors of both platforms, `tags` (2, draws) time tag errors of both platforms, and
+    `clock` (4, draws) clock coefficients. `registered` holds errors of registered kinds (see `error_kinds`), each
+    with its sizes (draws,). `alone` (4, draws) is for errors of which only the effects are known: quadratic and cubic
+    phase, and displacement east and north.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -219,7 +223,7 @@ class Sums:
         self._square = np.empty(size)
 
     def clear(self) -> None:
-        """Set all sums to zero, for the next block of draws."""
+        """Set all sums to zero before the next block of draws."""
         by_name = (self.motion, self.tags, self.clock, self.alone)
         for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
             for sums in kept:
@@ -228,7 +232,7 @@ class Sums:
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
-        """Add the errors and effects of one variable; `drawn` are its values (draws,)."""
+        """Add the errors and effects of one variable. `drawn` holds its values, (draws,)."""
         if self.phases:
             for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
                 if variable.effects[column]:
@@ -268,7 +272,7 @@ class Sums:
         return where[owner]
 
     def square(self, judged: HeldSum) -> Floats:
-        """Square of the error that a requirement limits, by the linear model, (draws,).
+        """Square of the error that a requirement limits, computed by the linear model, (draws,).
 
         The unit is the square of the unit of the requirement. The next call overwrites the returned array.
         """
@@ -288,7 +292,7 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """Square of the error that a requirement limits, by exact ranges, (draws,).
+        """Square of the error that a requirement limits, computed from exact ranges, (draws,).
 
         The unit is the square of the unit of the requirement. The value is NaN for draws without an image.
         """
@@ -330,18 +334,18 @@ class Sums:
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
-    """Add the arrays of several owners; `by_owner` holds the array of each owner.
+    """Add the arrays of several owners. `by_owner` maps each owner to its array.
 
-    Returns `nothing` if `by_owner` has no array for any of them.
+    Returns `nothing` if `by_owner` contains none of the owners.
     """
     of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
     return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
 
 
 class Drawer:
-    """Computation of pieces of the draws, with the state of the random streams between two pieces.
+    """Object that computes pieces of the draws, and keeps the state of the random streams between two pieces.
 
-    If a piece is in the same chunk as the previous piece and comes after it, its random streams are continued.
+    The random streams are continued if the next piece is in the same chunk, and after the previous piece.
     """
 
     def __init__(self, drawing: Drawing) -> None:
@@ -380,9 +384,10 @@ class Drawer:
         return Tally(tuple(holds), tuple(imaged), tuple(squares), all_hold)
 
     def _go_to(self, start: int) -> None:
-        """Move the random streams to the draw `start`.
+        """Move the random streams to the draw with the number `start`.
 
-        If the streams are in another chunk, or beyond `start`, they restart at the beginning of the chunk.
+        If the streams are in another chunk, or already past `start`, they restart at the beginning of the chunk that
+        contains `start`.
         """
         chunk = start // self._drawing.chunk
         if chunk != self._chunk or start < self._at:
@@ -405,10 +410,10 @@ class Drawer:
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:
-    """Whether exact ranges differ from the linear model by more than 1 % of a limit in any draw of a sample.
+    """Whether exact ranges and the linear model differ by more than 1 % of a limit in any draw of a sample.
 
-    Exact ranges include the hidden phase, which the linear model does not have. A hidden phase that changes a total
-    by more than 1 % of a limit therefore also requires exact ranges.
+    The hidden phase, which the bandwidth and the turn of the line of sight do not resolve, is included only in exact
+    ranges. Exact ranges are therefore also needed if the hidden phase changes a total by more than 1 % of a limit.
     """
     sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
     drawn = np.empty(_LINEARITY_DRAWS)
@@ -428,7 +433,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Choose the function that fills an array with normal draws: compiled by Numba if possible, otherwise from NumPy.
+    """Choose the function that fills an array with normal draws: compiled by Numba if possible, else from NumPy.
 
     Numba is not used if it is not installed, if there is little memory, or if it cannot store compiled code.
     """
@@ -446,7 +451,7 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
     """Fill an array with normal draws, in a loop that Numba compiles.
 
-    The draws are bit-identical to the draws of NumPy, and take two thirds of the time.
+    The draws are bit-identical to the draws of NumPy. The loop takes two thirds of the time that NumPy needs.
     """
     for index in range(out.size):
         out[index] = generator.standard_normal()
@@ -488,8 +493,8 @@ class _Stream:
     def skip(self, count: int, buffer: Floats) -> None:
         """Skip `count` draws of the stream.
 
-        A normal draw takes a varying number of random numbers, so normal draws are made and discarded. Other draws
-        take one random number each.
+        A normal draw uses a varying number of random numbers, so normal draws are made and discarded. A draw from any
+        other distribution uses exactly one random number.
         """
         if self._distribution != "normal":
             self._bits.advance(count)
@@ -505,10 +510,10 @@ _JACOBI_ROUNDS = 30  # convergence is quadratic: a 6 x 6 matrix needs about five
 def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
     """Compute the eigenvalues of a symmetric matrix (n, n), and its unit eigenvectors as columns, in any order.
 
-    Jacobi's method is used instead of `numpy.linalg.eigh`, because equal eigenvalues are common here: they result
-    from three similar axes without correlations, or from the same correlation in several pairs. The eigenvectors of
-    equal eigenvalues may be any basis. LAPACK libraries return different bases, even with a fixed sign and order, and
-    the same seed would then give different draws on different machines.
+    Jacobi's method is used instead of `numpy.linalg.eigh`, because equal eigenvalues are common here: they occur if
+    three similar axes are uncorrelated, or if several pairs of axes have the same correlation. The eigenvectors of
+    equal eigenvalues may be any basis of their eigenspace. LAPACK libraries return different bases, even with a fixed
+    sign and order, and the same seed would then give different draws on different machines.
     """
     n = len(matrix)
     a = [list(row) for row in matrix]
@@ -532,9 +537,9 @@ def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[li
 
 
 def _rotate(a: list[list[float]], v: list[list[float]], p: int, q: int, c: float, s: float) -> None:
-    """Rotate the axes p and q of matrix `a` so that a[p][q] becomes 0, and apply the rotation to `v` too.
+    """Rotate the axes p and q of the matrix `a` so that a[p][q] becomes 0, and apply the same rotation to `v`.
 
-    `c` and `s` are the cosine and sine of the angle.
+    `c` and `s` are the cosine and sine of the rotation angle.
     """
     for row in (*a, *v):
         row[p], row[q] = c * row[p] - s * row[q], s * row[p] + c * row[q]

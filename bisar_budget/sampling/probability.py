@@ -1,12 +1,12 @@
-"""Monte Carlo: errors are drawn from their declared distributions, to count how often each requirement is met.
+"""Monte Carlo: draw errors from their declared distributions and count how often each requirement is met.
 
-The result shows whether root-sum-square and worst case describe the sum of errors well. All declared errors are drawn
-at once, their effects by the full model are added, and the magnitude of the sum is compared with the requirement. For
-small errors the sum is linear in standard variables; for large errors it is computed from exact ranges (see the
-module `draws`). A covariance of a position and velocity error gives six variables, one along each eigenvector of its
-correlation matrix.
+The result shows whether the root-sum-square and worst-case rules are a good description of the sum of errors. All
+declared errors are drawn at once, their effects according to the full model are added, and the magnitude of the sum
+is compared with the requirement. For small errors the sum is linear in standardized random variables; for large
+errors it is computed from exact ranges (see the module `draws`). A covariance of a position and velocity error gives
+six variables, one along each eigenvector of its correlation matrix.
 
-Errors are drawn from the distributions themselves. The coverage factor, which turns sigmas into bounds, is not
+Errors are drawn from the distributions themselves, so the coverage factor, which turns sigmas into bounds, is not
 applied. Vibration is not drawn, because its amplitude is declared and its limits concern paired echoes.
 """
 
@@ -57,10 +57,11 @@ def monte_carlo(
     draws : int
         Number of draws, from 1 to `MAX_DRAWS`. Memory does not grow with it.
     seed : int, optional
-        Seed of the random numbers; None: `simulation.seed` of the file. The same seed gives the same result.
+        Seed of the random numbers. If it is None, `simulation.seed` of the mission file is used. The same seed gives
+        the same result.
     share : callable, optional
-        Function that computes the pieces of the draws; None: this process computes them one after the other. The
-        result is the same in both cases.
+        Function that computes the pieces of the draws, for example on several workers. If it is None, this process
+        computes them one after the other. The result does not depend on it.
 
     Raises
     ------
@@ -122,11 +123,13 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
     """Yield the independent variables of a random error of a sensor, a clock or the atmosphere.
 
-    Their effects are the columns of the Cholesky factor of a covariance. It is the covariance of four effects:
-    quadratic phase, cubic phase, and displacement east and north. The first variable has the quadratic phase and the
-    correlated part of all further effects. Each further variable has the remaining part of the next effect. An error
-    to which the coverage factor does not apply is a bound: its effects are drawn with their full size and a random
-    sign.
+    The effects of these variables are the columns of the Cholesky factor of the covariance of four effects: quadratic
+    phase, cubic phase, and displacement east and north. The first variable causes the whole quadratic phase, and the
+    part of each further effect that is correlated with it. Each following variable causes the part of the next effect
+    that the variables before it do not cause.
+
+    An error to which the coverage factor does not apply is a bound. Its effects are drawn with their full size and a
+    random sign.
     """
     if not error.declared or error.full.covariance is None or error.counted_in:
         return
@@ -166,7 +169,7 @@ def _requirements(
     """Yield the requirements with which draws are compared.
 
     These are the requirements of `check` to which declared errors contribute. `is_placed` states whether the
-    displacements of all errors are known. If not, the location error is left out.
+    displacements caused by all errors are known. If they are not, the requirement on location error is left out.
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -190,7 +193,7 @@ def _requirements(
 
 
 class _Predictions:
-    """Results that need no draws: combined errors as in `check`, variances, and probabilities for a normal sum."""
+    """Results that need no draws: combined errors as in `check`, variances, and probabilities of a normal sum."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
@@ -199,8 +202,8 @@ class _Predictions:
     def combined(self, judged: HeldSum, rule: str) -> float | None:
         """Combined size of the errors that contribute to a requirement, in the unit of the requirement.
 
-        `rule` is a rule of `allocation.combine`. The size includes the coverage factor. It is None if there is no
-        image with these errors.
+        `rule` is a rule of `allocation.combine`. The coverage factor is included. The result is None if no image is
+        formed with these errors.
         """
         members = [phase for phase in self.together.phases if phase.owner in judged.owners]
         if judged.columns == (0,):
@@ -212,7 +215,7 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Variance that each error or covariance adds to the sum for a requirement, by id.
+        """Variance that each error or covariance contributes to the sum that a requirement limits, by id.
 
         The unit is the square of the unit of the requirement.
         """
@@ -226,12 +229,12 @@ class _Predictions:
     def is_normal(self, name: str) -> bool:
         """Whether all variables of an error or a covariance are normally distributed.
 
-        The variables of a covariance always are. `name` is the id of the error or covariance.
+        This is always the case for a covariance. `name` is the id of the error or covariance.
         """
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
-        """Probability that a normal sum with the variances of the errors is within the limit of a requirement."""
+        """Probability that a normally distributed sum with the same variances as the errors is within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
         xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
@@ -243,11 +246,11 @@ class _Predictions:
 def _within(radius: float, xx: float, yy: float, xy: float) -> float:
     """Probability that a normal random vector (2,) with mean 0 is no longer than a radius.
 
-    `xx`, `yy` and `xy` are the elements of its covariance. Let a and b be its principal sigmas, and let z be a
-    standard normal vector with polar coordinates ρ and θ. The condition |(a z₁, b z₂)| ≤ r is
-    ρ² ≤ r²/(a²cos²θ + b²sin²θ), and ρ² has an exponential distribution. The probability is therefore the mean of a
-    smooth periodic function of θ. A sum over equal steps computes this mean to rounding error. For b = 0 the
-    expression is Craig's form of erf.
+    `xx`, `yy` and `xy` are the elements of its covariance matrix. Let r be the radius, a and b the standard
+    deviations along the principal axes, and z a standard normal vector with polar coordinates ρ and θ. The condition
+    |(a z₁, b z₂)| ≤ r is ρ² ≤ r²/(a²cos²θ + b²sin²θ), and ρ² has an exponential distribution. The probability is
+    therefore the mean of a smooth periodic function of θ. A sum over equal steps of θ gives this mean to within
+    rounding errors. For b = 0 the expression is Craig's form of erf.
     """
     middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
     large, small = middle + spread, max(0.0, middle - spread)
@@ -262,9 +265,10 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
-    """Confidence interval of a probability by the Wilson score; `quantile` is the quantile of the standard normal.
+    """Confidence interval of a probability by the Wilson score.
 
-    The formula is also valid for a small number of draws, even if all of them succeed or fail.
+    `quantile` is a quantile of the standard normal distribution. The formula is also valid for a small number of
+    draws, even if all of them succeed or all fail.
     """
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)
@@ -300,9 +304,9 @@ def _requirement(
 
 
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Yield a warning if root-sum-square or a normal distribution is a poor description of the sum of errors.
+    """Yield warnings if root-sum-square or a normal distribution describes the errors of a requirement poorly.
 
-    The sum is the sum of the errors that a requirement limits.
+    The errors of a requirement are the errors whose sum the requirement limits.
     """
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
@@ -325,7 +329,7 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
 def _hides_phase(error: RandomError) -> bool:
     """Whether the hidden phase of an error exceeds a tenth of its quadratic phase.
 
-    The hidden phase is the part of the phase that the bandwidth and the turn of the line of sight do not resolve.
+    The hidden phase is the part of the phase that the bandwidth and the turn of the line of sight cannot resolve.
     """
     return bool(np.any(error.full.hidden > _HIDDEN_FRACTION * np.abs(error.full.quadratic)))
 

@@ -36,31 +36,34 @@ class PhaseGradientSettings:
     Attributes
     ----------
     max_lines : int
-        Largest number of range lines that are used. More lines take more time and improve the estimate little.
+        Largest number of range lines that are used. Additional lines would take more time and hardly improve the
+        estimate.
     target_count, targets_per_line : int
         Largest number of targets that are used in the whole image, and in each range line.
     secondary_fraction : float
-        Smallest power of each target after the strongest in a line, as a fraction of the largest power of the line.
-        Sidelobes are weaker.
+        Smallest power of a further target in a range line, as a fraction of the largest power of the line. Sidelobes
+        are weaker than this.
     false_alarm_probability : float
         Probability that a target is detected anywhere in an image of clutter alone.
     clutter_floor_ratio : float
-        Lower bound of the clutter power of a line, as a ratio to the peak power of the image. Lower powers come from
-        rounding, not from clutter.
+        Lower bound of the clutter power of a line, relative to the peak power of the image. Lower values are caused
+        by rounding, not by clutter.
     smear_fraction : float
-        Power at which the mean response is considered to end, as a fraction of its peak. Both powers are measured
-        above the median.
+        Power at which the mean response is considered to end, as a fraction of its peak power. Both powers are
+        measured from the median.
     shrink_factor : float
-        Smallest ratio of the window width of an iteration to that of the previous iteration.
+        Smallest ratio of the window width of an iteration to the window width of the previous iteration.
     narrowest_cells : int
         Smallest half width of a window. [cells]
     bridge_cells : int
-        Largest width of a gap in the mean response that is bridged next to the peak. [cells] For a gap farther from
-        the peak, the width is increased by half the distance. Nulls within a smeared response are narrower.
+        Largest gap in the mean response that is bridged next to the peak [cells]. Farther from the peak, wider gaps
+        are bridged: half the distance from the peak is added to this limit. Nulls within a smeared response are
+        narrower.
     coherent_rad : float
-        RMS phase below which responses can be added coherently over the full aperture. [rad]
+        Rms phase error below which responses can be added coherently over the full aperture. [rad]
     significant_sigma : float
-        Smallest phase component that an iteration keeps, in standard deviations of components from clutter alone.
+        Smallest phase component that an iteration keeps, in standard deviations of the components that clutter alone
+        causes.
     """
 
     max_lines: int = 96
@@ -84,9 +87,8 @@ _PGA = PhaseGradientSettings()
 class Focused:
     """Image after autofocus, and the phase [rad] that autofocus removed from its spectrum along the second axis.
 
-    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`; `autofocus_in_scene_axes` returns a different length.
-    It is 0 outside the band of the aperture. It has no constant or linear part over the band, because these parts do
-    not defocus: a linear phase only displaces the image.
+    `phase` is (ny,), in the order of `numpy.fft.fftfreq(ny)`, and 0 outside the band of the aperture. Within the band
+    it has no constant or linear part, because these parts do not defocus: a linear phase only displaces the image.
     """
 
     image: Complexes
@@ -94,13 +96,13 @@ class Focused:
 
 
 def phase_gradient_autofocus(image: Complexes) -> Focused:
-    """Estimate a phase error of any shape that is common to all range lines, and remove it.
+    """Estimate the phase error that is common to all range lines, whatever its shape, and remove it.
 
     Targets stronger than clutter are selected, centred to a fraction of a sample, windowed, and transformed to the
     aperture. While they are smeared, the gradient kernel estimates their common phase. Once they can be added
     coherently, the phase is estimated from the principal eigenvector of their covariance, by power iteration. The
-    phase only has components that vary slowly enough for the window. Each iteration estimates the remaining phase,
-    and drops the components that are as small as components from clutter alone. The iteration ends when all
+    estimate contains only components that vary slowly enough for the window. Each iteration estimates the remaining
+    phase, and drops components that are so small that clutter alone could cause them. The iterations end when all
     components are dropped.
 
     Parameters
@@ -112,7 +114,8 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
     Returns
     -------
     Focused
-        The image unchanged and a phase of zeros if no target exceeds the clutter, as in a homogeneous scene.
+        Focused image and removed phase. If no target exceeds the clutter, as in a homogeneous scene, the image is
+        unchanged and the phase is zero.
 
     Raises
     ------
@@ -121,13 +124,14 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
     Notes
     -----
-    A smeared target must exceed the clutter. Its power, divided by the number of cells over which it is smeared, must
-    exceed the mean clutter power by a factor of ln(pixels / 10⁻³). In a million pixels this factor is 13 dB.
+    A target must exceed the clutter even if it is smeared: its power, divided by the number of cells over which it is
+    smeared, must exceed the mean clutter power by a factor of ln(pixels / 10⁻³). In a million pixels this factor is
+    13 dB.
 
     Clutter causes an error of the estimated phase of about √(window / (2 · targets · ratio)) rad rms. Here the window
-    is ±12 cells, and the ratio is that of target power to clutter power. If an image has no more than a dozen
-    targets, targets in each other's windows add 0.1 to 0.3 rad. Where a taper falls below a tenth of its maximum, as
-    a Taylor taper of -45 dB does, the phase is not corrected.
+    is ±12 cells, and the ratio is the target power divided by the clutter power. In an image of at most a dozen
+    targets, targets that lie in each other's windows add 0.1 to 0.3 rad. The phase is not corrected where the
+    amplitude taper falls below a tenth of its maximum, as a Taylor taper of -45 dB does at its ends.
     """
     image = _checked(image)
     rows, level = _range_lines(image)
@@ -143,23 +147,25 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
 
 def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
-    """Estimate and remove a quadratic, or quadratic and cubic, phase error by shifts between sub-aperture images.
+    """Estimate a quadratic (or quadratic and cubic) phase error from shifts between sub-aperture images, and remove
+    it.
 
-    The phase error over a sub-aperture is mainly linear, which shifts the image of the sub-aperture along y′. The
-    shifts are measured by the cross-correlation of the powers of two images along y′, summed over range lines. The
-    estimate is repeated until the images are no longer shifted against each other.
+    The phase error over a sub-aperture is mainly linear, and a linear phase shifts the image of the sub-aperture
+    along y′. The shift between two images is measured by cross-correlating their powers along y′, summed over range
+    lines. The estimate is repeated until the images are no longer shifted against each other.
 
     Parameters
     ----------
     image : (nx, ny) ndarray
         As for `phase_gradient_autofocus`.
     sub_apertures : int
-        2 estimates a quadratic phase, 3 a quadratic and a cubic phase.
+        2 to estimate a quadratic phase, or 3 to estimate a quadratic and a cubic phase.
 
     Returns
     -------
     Focused
-        The image unchanged and a phase of zeros if sub-aperture images do not correlate.
+        Focused image and removed phase. If the sub-aperture images do not correlate, the image is unchanged and the
+        phase is zero.
 
     Raises
     ------
@@ -168,10 +174,10 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
 
     Notes
     -----
-    Map drift needs features that all sub-aperture images show: points, edges, texture. Speckle of disjoint
-    sub-apertures is independent, so a homogeneous scene gives no estimate. Phase errors of orders above the estimated
-    orders remain in the image and may bias the estimate. With two sub-apertures a cubic phase does not change the
-    estimate, but a quartic phase is partly counted as quadratic. The smear must be much narrower than the image,
+    Map drift needs features that are visible in all sub-aperture images: points, edges, texture. The speckle of
+    disjoint sub-apertures is independent, so a homogeneous scene gives no estimate. Phase errors of higher orders
+    remain in the image and may bias the estimate. With two sub-apertures a cubic phase does not change the estimate,
+    but a quartic phase is partly mistaken for a quadratic phase. The smear must be much narrower than the image,
     because the correlation is circular.
     """
     if sub_apertures not in (2, 3):
@@ -212,11 +218,11 @@ ALGORITHMS: dict[str, Callable[[Complexes], Focused]] = {
 
 
 def aperture_band(spectrum: Complexes) -> Indices:
-    """Indices of the frequencies that the aperture fills in a spectrum (lines, frequencies), in ascending frequency.
+    """Indices of the frequencies of a spectrum (lines, frequencies) that the aperture fills, sorted by frequency.
 
     The spectrum is in the order of the FFT, and the filled band may wrap around its ends. Frequencies with less than
-    a tenth of the largest amplitude count as empty. If no empty gap is wider than 5 % of the spectrum, the aperture
-    fills the whole spectrum. The indices then begin at the most negative frequency.
+    a tenth of the largest amplitude count as empty. If no gap of empty frequencies is wider than 5 % of the spectrum,
+    the whole spectrum counts as filled, and the indices begin at the most negative frequency.
     """
     count = spectrum.shape[1]
     strength = np.sqrt(np.mean(np.abs(spectrum) ** 2, axis=0))
@@ -256,19 +262,19 @@ def _aperture_places(count: int) -> Floats:
 
 
 def _threshold(pixels: int) -> float:
-    """Ratio of a pixel's power to the mean clutter power above which the pixel counts as a target.
+    """Power, relative to the mean clutter power, above which a pixel counts as a target.
 
-    In an image of `pixels` pixels of clutter alone, whose power is exponentially distributed, the probability that
-    any pixel exceeds the threshold is the false-alarm probability.
+    In an image of `pixels` pixels that contains only clutter, with exponentially distributed power, the probability
+    that any pixel exceeds the threshold is the false-alarm probability.
     """
     return math.log(pixels / _PGA.false_alarm_probability)
 
 
 def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
-    """Indices of the range lines that contain a target, and the mean clutter power of each line, (lines,) each.
+    """Indices of the range lines that contain a target, and the mean clutter power of these lines.
 
-    The line with the largest ratio of peak power to clutter power is first. Both arrays are empty if there is no
-    target.
+    Both arrays are (lines,), and are empty if there is no target. The lines are sorted by the ratio of peak power to
+    clutter power, beginning with the largest.
     """
     power = image.real**2 + image.imag**2
     peak = power.max(axis=1)
@@ -284,10 +290,11 @@ def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
 
 
 def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
-    """Estimate the phase over the band that is common to all range lines, by phase gradients, (count,). [rad]
+    """Estimate the phase error that all range lines have in common over the band, by phase gradients, (count,). [rad]
 
-    `aperture` (lines, count) is the spectrum of range lines within the band, scaled to a clutter power of 1. A range
-    line is computed from it with `line_samples` samples. Pixels with a power above `threshold` count as targets.
+    `aperture` (lines, count) is the spectrum of the range lines within the band, scaled so that the clutter power is
+    1. Range lines of `line_samples` samples are computed from it. Pixels with a power above `threshold` count as
+    targets.
     """
     count = aperture.shape[1]
     per_cell = line_samples / count
@@ -320,10 +327,10 @@ def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> F
 
 
 def _smear(power: Floats, per_cell: float) -> int:
-    """Half width of the mean response of range lines, aligned at their peaks. [samples]
+    """Half width of the mean response of range lines that are aligned at their peaks. [samples]
 
-    At each distance from the peak, the stronger side of each line is used for the mean. `power` is (lines, samples),
-    and `per_cell` is the number of samples per resolution cell.
+    At each distance from the peak, the stronger of the two sides of a line is used for the mean. `power` is (lines,
+    samples), and `per_cell` is the number of samples per resolution cell.
     """
     samples = power.shape[1]
     column = power.argmax(axis=1)[:, None]
@@ -342,10 +349,11 @@ def _smear(power: Floats, per_cell: float) -> int:
 
 
 def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indices]:
-    """Rows and columns of targets: the strongest pixel of each line, and further strong pixels, (targets,) each.
+    """Rows and columns of targets: the strongest pixel of each line, and further strong pixels.
 
-    `power` is (lines, samples), in units of the clutter power. A further pixel is more than 2 · `half` samples from
-    all stronger targets of its line. Its power exceeds `threshold` and a fraction of the largest power of its line.
+    Both arrays are (targets,). `power` is (lines, samples), in units of the clutter power. A further target must be
+    more than 2 · `half` samples from all stronger targets of its line, and its power must exceed both `threshold` and
+    a fraction of the largest power of its line.
     """
     remaining = power.copy()
     row = np.arange(power.shape[0])
@@ -365,13 +373,13 @@ def _targets(power: Floats, half: int, threshold: float) -> tuple[Indices, Indic
 
 
 def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
-    """Shift the interpolated peak of each response to sample 0, by a phase ramp over the aperture.
+    """Shift the interpolated peak of each response to sample 0 by a phase ramp over the aperture.
 
     `aperture` (targets, count) holds the spectra of the responses. `column` (targets,) is the strongest sample of
-    each response, in a line of `samples` samples. The interpolated peak of the power is found by Newton's method.
+    each response, in a line of `samples` samples. The peak of the power between samples is found by Newton's method.
 
-    If a window is off the peak by a fraction of a sample, it bends the phase at the edges of the aperture. Without
-    this shift, the bend would have the same direction in each iteration, and the estimate would drift.
+    A window that is off the peak by a fraction of a sample would bend the phase at the edges of the aperture. The
+    bend would have the same direction in each iteration, so that the estimate would drift.
     """
     count = aperture.shape[1]
     turn = 2 * math.pi / samples
@@ -389,9 +397,9 @@ def _centred(aperture: Complexes, column: Indices, samples: int) -> Complexes:
 
 
 def _phasors(angle: Floats, count: int) -> Complexes:
-    """Phasors exp(j · angle · n) of several angles for n = 0 … count - 1, (angles, count).
+    """Phasors exp(j · angle · n) for several angles and n = 0 … count - 1, (angles, count).
 
-    They are products of coarse and fine phasors, so that only a few exponentials are computed.
+    They are computed as products of coarse and fine phasors, so that only a few exponentials are needed.
     """
     fine = np.exp(1j * np.outer(angle, np.arange(32)))
     coarse = np.exp(1j * np.outer(angle, np.arange(0, count, 32)))
@@ -400,12 +408,13 @@ def _phasors(angle: Floats, count: int) -> Complexes:
 
 
 def _basis(strength: Floats, order: int) -> Floats:
-    """Smooth basis functions of a phase error, (count, functions): polynomials up to the cubic, then cosines.
+    """Smooth basis functions for a phase error, (count, functions): polynomials up to the cubic, then cosines.
 
-    They are orthonormal with the power over the aperture, `strength` (count,), as weight. Their number is `order`, at
-    most count // 2. The polynomials represent the slopes at both ends, so that the cosine series of a smooth phase
-    converges fast. The n-th cosine completes n/2 cycles over the aperture. Samples outside the response, into which
-    it leaks in an image of finite extent, have little power and therefore little weight.
+    They are orthonormal with respect to the weights `strength` (count,), which are the power over the aperture. There
+    are `order` functions, but at most count // 2. The polynomials represent the slopes at both ends, so that the
+    cosine series of a smooth phase converges fast. The n-th cosine completes n/2 cycles over the aperture. In an
+    image of finite extent, the spectrum leaks into samples outside the aperture; these samples have little power and
+    therefore little weight.
     """
     aperture_place = _aperture_places(strength.size)
     columns = [aperture_place**power for power in range(4)]
@@ -417,7 +426,7 @@ def _basis(strength: Floats, order: int) -> Floats:
 
 
 def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -> Floats:
-    """Estimate the phase error over the aperture that is common to windowed and centred responses, (count,). [rad]
+    """Estimate the phase error that windowed, centred responses have in common over the aperture, (count,). [rad]
 
     `responses` (targets, count) holds the spectra of the responses. `samples` is the number of samples of a range
     line. A large phase is estimated by the gradient kernel alone. A small phase is refined by the principal
@@ -454,9 +463,9 @@ def _step(responses: Complexes, basis: Floats, strength: Floats, samples: int) -
 def _drifts(aperture: Complexes, segments: list[Indices], pairs: list[tuple[int, int]]) -> Floats | None:
     """Difference between the phase slopes over the two sub-apertures of each pair, (pairs,). [rad/sample]
 
-    It is the slope over the second sub-aperture minus the slope over the first. `aperture` is (lines, samples), and
-    each item of `segments` holds the sample indices of a sub-aperture. The result is None if the images of a pair do
-    not correlate.
+    The slope over the first sub-aperture is subtracted from the slope over the second. `aperture` is (lines,
+    samples), and each item of `segments` holds the sample indices of a sub-aperture. The result is None if the images
+    of any pair do not correlate.
     """
     samples = 2 * aperture.shape[1]  # the power of an image has twice its bandwidth
     powers = [

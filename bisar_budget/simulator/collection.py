@@ -1,4 +1,4 @@
-"""Simulation of a mission's data collection with errors, and of the image around a displaced point."""
+"""Simulation of a mission's data collection with errors, and of images around the displaced point of a scatterer."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -63,15 +63,15 @@ _PULSES_PER_CELL, _LARGE_PATCH_CELLS = 4, 128  # a response repeats after as man
 class RangeLines:
     """Grid of ground pixels along lines of equal range and of equal Doppler.
 
-    On this grid a point response is the product of its two cuts. On a straight grid this does not hold if a platform
-    is near, because the cross-range cut follows an ellipse, and the range sidelobes follow lines of equal Doppler.
-    Here the pixels of a line have the same range sum at the aperture midpoint, and the pixels of a column have the
-    same change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch may bend
-    around a platform.
+    On this grid a point response is the product of its range cut and its cross-range cut. On a straight grid this
+    does not hold if a platform is near, because the cross-range cut follows an ellipse, and the range sidelobes
+    follow lines of equal Doppler. Here all pixels of a line have the same range sum at mid-aperture, and all pixels
+    of a column have the same change of the range sum over the aperture. Lines are followed from the middle outwards,
+    so a patch may bend around a platform.
 
     Doppler may reverse within the aperture if the line of sight turns far, as on a full circle. The range sums at the
     start, middle and end of the aperture then do not determine a point. In this case the pixels are placed along
-    straight lines, and sample the full wave-number support.
+    straight lines, with a spacing that samples the full wave-number support.
 
     `transmitter` and `receiver` are the measured positions at an odd number of times that are evenly spaced over the
     aperture, (times, 3). [m]
@@ -81,9 +81,10 @@ class RangeLines:
     receiver: Floats
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """Ground gradients of the range sum at mid-aperture and of its change over the aperture. [m/m]
+        """Ground gradients of the range sum at mid-aperture, and of its change over the aperture. [m/m]
 
-        Points (..., 2) give two arrays (..., 2), in this order. The change is the last range sum minus the first.
+        For points (..., 2) the results are two arrays (..., 2), in this order. The change is the last range sum minus
+        the first.
         """
         first, middle, last = self._sums(points)
         return middle, last - first
@@ -91,7 +92,7 @@ class RangeLines:
     def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Ground gradients of the range sum at the start, middle and end of the aperture. [m/m]
 
-        Points (..., 2) give three arrays (..., 2).
+        For points (..., 2) the results are three arrays (..., 2).
         """
         sums = self._gradients(points, np.array([0, len(self.transmitter) // 2, -1]))
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
@@ -120,7 +121,7 @@ class RangeLines:
         """Ground vector along the line of equal Doppler that increases the range sum by one metre, (..., 2). [m/m]
 
         `by_range` and `by_doppler` are the results of `gradients` at points (..., 2). Where this vector would be too
-        long, a vector perpendicular to the lines of equal range is returned instead.
+        long, it is replaced by a vector perpendicular to the lines of equal range.
         """
         slant = _left(by_doppler)
         square, slope = _dot(by_range, by_range), _dot(by_range, slant)
@@ -129,27 +130,34 @@ class RangeLines:
         return step
 
     def range_sum(self, points: Floats) -> Floats:
-        """Range sum of ground points (..., 2 or 3) at mid-aperture, (...). [m]"""
+        """Range sum at mid-aperture for ground points. [m]
+
+        For points (..., 2 or 3) the result has the shape (...).
+        """
         return self._range_sum(points, [len(self.transmitter) // 2])
 
     def carrier(self, points: Floats) -> Floats:
-        """Range sum whose phase is removed from images, for ground points (..., 2 or 3), (...). [m]
+        """Range sum whose phase is removed from images, for ground points. [m]
 
-        It is the range sum at mid-aperture, or the mean range sum over time if Doppler reverses within the aperture.
+        For points (..., 2 or 3) the result has the shape (...). It is the range sum at mid-aperture, or the mean
+        range sum over time if Doppler reverses within the aperture.
         """
         return self._range_sum(
             points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
         )
 
     def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
-        """Range sum of ground points (..., 2 or 3), averaged over the times with the given indices, (...). [m]"""
+        """Mean range sum over the times with the given indices. [m]
+
+        For ground points (..., 2 or 3) the result has the shape (...).
+        """
         total: Floats = np.zeros(points.shape[:-1])
         for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
             total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
         return total / len(times)
 
     def turns_left(self, centre: GroundVector) -> bool:
-        """Whether the change of the range sum over the aperture increases along y′ at a ground point.
+        """Whether the change of the range sum over the aperture increases along y′ at a ground point `centre`.
 
         The axis y′ is 90° counter-clockwise of the direction to the platforms.
         """
@@ -157,7 +165,7 @@ class RangeLines:
         return float(by_doppler @ _left(by_range)) < 0
 
     def axes(self, centre: GroundVector) -> Floats:
-        """Unit vectors along x′ and y′, as the columns of an array (2, 2).
+        """Unit vectors along x′ and y′ at a ground point, as the columns of an array (2, 2).
 
         The axis x′ points towards the platforms, and y′ is 90° counter-clockwise of x′.
         """
@@ -166,10 +174,10 @@ class RangeLines:
         return np.stack((towards, _left(towards)), axis=1)
 
     def cells(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
-        """Resolution at a ground point, from peak to first null, across and along the lines of equal range. [m]
+        """Resolution at a ground point across and along the lines of equal range, from peak to first null. [m]
 
         If Doppler reverses within the aperture, the result is the pixel spacing that samples the full wave-number
-        support. A `ValueError` is raised if range or Doppler does not change over the ground at the point.
+        support. A `ValueError` is raised if range or Doppler is constant over the ground at this point.
         """
         ground_point = np.asarray(centre, dtype=float)
         if self.turns_back:
@@ -185,9 +193,10 @@ class RangeLines:
     def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cell sizes that set the pixel spacing, across and along the lines of equal range. [m]
 
-        They are the results of `cells`, except that the size across the lines may be smaller. If the aperture is long
-        and a platform is near, the wavefronts are strongly curved. A point is then out of focus even at pixels in its
-        column that are less than a cell away, and the spectrum along the column is wider than the bandwidth.
+        The sizes are the results of `cells`, except that the size across the lines may be smaller. If the aperture is
+        long and a platform is near, the wavefronts are so strongly curved that a point is out of focus even less than
+        a cell away along its column. The spectrum along the column is then wider than the bandwidth, so that smaller
+        pixels are needed.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -200,10 +209,10 @@ class RangeLines:
         return min(across, _MAX_SPECTRUM_CELLS / (1 / across + wider)), along
 
     def offsets(self, ground_points: Floats, centre: GroundVector, radar: Band) -> Floats:
-        """Signed distances of ground points (n, 2) from a centre along x′ and y′, in resolution cells, (n, 2).
+        """Signed distances of ground points from a centre along x′ and y′, in resolution cells, (n, 2).
 
-        They are computed from the range sum at mid-aperture and from its change over the aperture. If Doppler
-        reverses within the aperture, they are computed along straight axes.
+        `ground_points` is (n, 2). The distances are computed from the range sum at mid-aperture and from its change
+        over the aperture. If Doppler reverses within the aperture, they are computed along straight axes.
         """
         if self.turns_back:
             return np.asarray(
@@ -216,11 +225,11 @@ class RangeLines:
         return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT_MPS
 
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
-        """Phasor that removes the phase of the `carrier` range from an image at points (..., 3), (...).
+        """Phasor that removes the phase of the `carrier` range from an image, at the pixel positions `points`.
 
-        A backprojected image has the phase of the range to each pixel. Close to a platform this phase is a chirp
-        across the patch, which hides the spectrum of the aperture from autofocus. Removing the phase reveals this
-        spectrum.
+        For points (..., 3) the result has the shape (...). The pixels of a backprojected image have the phase of
+        their range. Close to a platform this phase is a chirp across the patch, which hides the spectrum of the
+        aperture from autofocus. Removing the phase reveals this spectrum.
         """
         carrier_range = self.carrier(points) - self.carrier(np.zeros(2))
         phase: Complexes = np.exp(-2j * math.pi / wavelength_m * carrier_range)
@@ -236,13 +245,13 @@ class RangeLines:
         spacing : (2,) float
             Distance between neighbouring pixels at the centre, across the lines of equal range and along them. [m]
         shape : (2,) int
-            Number nx of lines, counted towards the platforms, and number ny of pixels of a line, counted
-            counter-clockwise of that direction.
+            Number nx of lines of equal range, and number ny of pixels per line. The first index increases towards the
+            platforms, and the second index increases 90° counter-clockwise of this direction.
 
         Returns
         -------
         (nx, ny, 3) ndarray
-            East, north, up. [m]
+            East, north and up of each pixel. [m]
         """
         nx, ny = shape
         middle = np.asarray(centre, dtype=float)
@@ -254,13 +263,14 @@ class RangeLines:
         doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
 
         def across(points: Floats) -> Floats:
-            """Vectors along lines of equal Doppler from points (..., 2) to the next line of equal range. [m]"""
+            """Vectors from points (..., 2) along lines of equal Doppler to the next line of equal range. [m]"""
             return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
-            """Vectors from points (..., 2) to the next pixel of their line of equal range. [m]
+            """Vectors from points (..., 2) to the next pixel on their line of equal range. [m]
 
-            The steps are equal in Doppler. A vector is shortened if it exceeds a maximum length.
+            Neighbouring pixels differ by the same step in Doppler. A vector is shortened if it exceeds a maximum
+            length.
             """
             g, d = self.gradients(points)
             tangent = -_left(g) / np.sqrt(_dot(g, g))
@@ -287,9 +297,10 @@ class RangeLines:
 class Chip(NamedTuple):
     """Image of a patch, (nx, ny), and the ground points of its pixels, (nx, ny, 3). [m]
 
-    `spacing` is the distance between neighbouring pixels in the middle of the patch, along x′ and y′. [m] For the
-    measured paths, lines of pixels along y′ have equal range, and columns have equal Doppler. The phase of the range
-    to each pixel at mid-aperture is removed, so the image has the spectrum of the aperture, centred at zero.
+    `spacing` [m] is the distance between neighbouring pixels in the middle of the patch, along x′ and y′. According
+    to the measured paths, all pixels of a line along y′ have the same range, and all pixels of a column have the same
+    Doppler. The phase of the range to each pixel at mid-aperture is removed, so that the spectrum of the image is the
+    spectrum of the aperture, centred at zero.
     """
 
     image: Complexes
@@ -303,7 +314,7 @@ class Chip(NamedTuple):
         return middle
 
     def within(self, cells: int) -> "Chip":
-        """Crop the chip to the middle `cells` resolution cells along y′; a narrower chip is returned unchanged."""
+        """Crop the chip to its middle `cells` resolution cells along y′. A narrower chip is returned unchanged."""
         columns = 2 * round(cells * OVERSAMPLING_FACTOR / 2)
         start = self.image.shape[1] // 2 - columns // 2
         if start <= 0:
@@ -313,7 +324,7 @@ class Chip(NamedTuple):
 
 
 class PointCollection:
-    """Simulated collection of a mission, from which images of a single point are formed."""
+    """Simulated data collection of a mission, from which images of a single point are formed."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:
         self.radar, self.geometry = mission.radar, geometry
@@ -333,14 +344,14 @@ class PointCollection:
         return SPEED_OF_LIGHT_MPS / self.radar.bandwidth
 
     def window(self, count: int) -> Floats:
-        """Window weights of `count` samples over the aperture or the band, (count,); all are 1 without a taper."""
+        """Window weights of `count` samples over the aperture or the band, (count,). They are 1 without a taper."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
     def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
         """Compute the true and measured paths of both platforms and the clock errors at given slow times.
 
         If the receiver uses the direct signal of the transmitter as its clock, the errors of both paths also cause a
-        clock error. Errors with wideband vibration need the random generator `rng`.
+        clock error. The random generator `rng` is needed if the errors contain wideband vibration.
         """
         metre_motions = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
         transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, metre_motions[0])
@@ -379,7 +390,7 @@ class PointCollection:
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
         """Compute from exact ranges how errors displace a ground point in the image, and which phase errors remain.
 
-        `seen_from` is the ground point, east and north. [m] The displacement is relative to it.
+        `seen_from` [m] holds east and north of this ground point. The displacement is relative to the point.
 
         Raises
         ------
@@ -393,7 +404,7 @@ class PointCollection:
     def range_lines(self, errors: Errors) -> RangeLines:
         """Lines of equal range along which a processor places its pixels.
 
-        They are computed for the measured paths without vibration.
+        They are computed from the measured paths without vibration.
         """
         times = np.linspace(-1.0, 1.0, _PATH_SAMPLES) * self.aperture_time / 2
         return RangeLines(*(path.measured for path in self.flight(errors.smooth(), times).paths))
@@ -408,18 +419,19 @@ class PointCollection:
         range_cells: int = 0,
         is_reference: bool = False,
     ) -> Chip:
-        """Form the image of a scatterer around a ground point, without noise.
+        """Form the image of a scatterer, without noise, on a patch that is centred at a ground point.
 
         Parameters
         ----------
         centre : (2,) float
-            East, north. [m]
+            East and north of the centre of the image. [m]
         errors : Errors
             Errors of the recorded data and of the measured paths from which the image is formed.
         scatterer : (2,) float
-            East, north. [m]
+            East and north of the scatterer. [m]
         cells, range_cells : int
-            Extent in resolution cells along y′ and x′. 0 range cells give a single line through the centre.
+            Extent of the image in resolution cells along y′ and x′. If `range_cells` is 0, the image is a single line
+            through the centre.
         is_reference : bool
             If true, the data are recorded as if the platforms flew the measured paths with a perfect clock. The
             result is the image that the same processor forms without errors.
@@ -427,8 +439,8 @@ class PointCollection:
         Raises
         ------
         ValueError
-            The patch aliases with the mission's number of pulses, the patch is too large, or forming or measuring the
-            image needs more memory than `memory_limit`. All three are checked before data are computed.
+            The mission's number of pulses is so small that the patch aliases, the patch is too large, or forming or
+            measuring the image needs more memory than `memory_limit`. This is checked before data are computed.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, pulses_for(cells))
@@ -449,8 +461,8 @@ class PointCollection:
     ) -> tuple[Chip, Chip]:
         """Form the image of the scene centre with errors, and a reference image without errors, on the same pixels.
 
-        `ground_point` is the displaced point at which the scene centre appears. It is the centre of both images. The
-        reference image shows a scatterer at `ground_point`.
+        `ground_point` is the displaced point at which the scene centre appears, and the centre of both images. In the
+        reference image the scatterer is at `ground_point`.
         """
         return (
             self.chip(ground_point, errors, cells=cells, range_cells=range_cells),
@@ -462,7 +474,7 @@ class PointCollection:
     def _grid(
         self, centre: GroundVector, errors: Errors, cells: int, range_cells: int
     ) -> tuple[Floats, tuple[float, float]]:
-        """Pixel positions (nx, ny, 3) of a chip, and the spacing of its pixels along x′ and y′. [m]
+        """Pixel positions of a chip, (nx, ny, 3), and the spacing of its pixels along x′ and y′. [m]
 
         The last grid is cached, because images are formed in pairs. A `ValueError` is raised if the patch aliases or
         is too large.
@@ -482,9 +494,9 @@ class PointCollection:
         return self._last_grid[1:]
 
     def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
-        """Number of frequencies for which range profiles do not repeat within the patch.
+        """Number of frequencies that is sufficient to keep range profiles from repeating within the patch.
 
-        Range walk is included.
+        Range walk is taken into account.
         """
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
@@ -503,7 +515,7 @@ class PointCollection:
         """Raise a `ValueError` if a patch aliases, is too large or needs too much memory.
 
         The patch is `cells` resolution cells wide along y′ and `range_cells` along x′. The memory is checked for the
-        number of pulses that the patch needs; additional pulses would not change its image.
+        number of pulses that the patch needs, because additional pulses would not change the image.
         """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
@@ -516,7 +528,7 @@ class PointCollection:
         self._require_memory(pixels, pulses_for(cells), _MIN_CHIP_FREQUENCY_COUNT)
 
     def _require_memory(self, pixels: int, pulses: int, frequencies: int) -> None:
-        """Raise a `ValueError` if forming or measuring a pair of images needs more memory than the limit."""
+        """Raise a `ValueError` if forming or measuring a pair of images needs more than the allowed memory."""
         forming = pulses * frequencies * _BYTES_PER_SAMPLE + bytes_held(self.kernel)
         reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * MAX_CONTRIBUTION_COUNT) + bytes_held("numpy")
         needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
@@ -537,10 +549,10 @@ def pulses_for(cells: int) -> int:
 
 
 def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
-    """Follow the curves of a vector field from points `start` (..., 2) in both directions.
+    """Follow the curves of a vector field from the points `start` (..., 2) in both directions.
 
-    `step` gives the vector from a point to the next point of its curve. Returns the points along the curves,
-    (count, ..., 2). The start is at index count // 2.
+    `step` returns the vector from a point to the next point on its curve. The result is the points along the curves,
+    (count, ..., 2), with `start` at the index count // 2.
     """
     back = count // 2
     direction = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
@@ -559,7 +571,11 @@ def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Fl
 
 
 def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
-    """Interpolate between the points a and b by a cubic with given slopes per pixel, at fractions t from 0 to 1."""
+    """Interpolate between the points a and b by a cubic.
+
+    `t` holds positions between the points, as fractions of the way from a (0) to b (1). `slope_a` and `slope_b` are
+    the slopes of the cubic at a and b, per pixel.
+    """
     slope_a, slope_b = _GRID_STRIDE_PIXELS * slope_a, _GRID_STRIDE_PIXELS * slope_b
     s = 1 - t
     cubic: Floats = s * s * (1 + 2 * t) * a + t * t * (1 + 2 * s) * b + s * t * (s * slope_a - t * slope_b)
@@ -572,6 +588,6 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def _left(vectors: Floats) -> Floats:
-    """Turn plane vectors (..., 2) by 90° counter-clockwise."""
+    """Rotate plane vectors (..., 2) by 90° counter-clockwise."""
     turned: Floats = vectors[..., ::-1] * np.array([-1.0, 1.0])
     return turned

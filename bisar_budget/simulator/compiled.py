@@ -1,13 +1,13 @@
 """Parallel backprojection compiled by Numba, which needs the extra `fast`.
 
-Import this module only where a missing Numba is handled.
+Import this module only in code that handles the `ImportError` of a missing Numba.
 
-Range profiles are refined until a cubic B-spline, which has four taps, can interpolate them. The spectrum is divided
-by the transform of the spline, which is known in closed form. On a lattice of pixels, the range is computed exactly
-in the middle of each run of 32 pixels of a line, and expanded to fourth order along the run. For pixels that are not
-on a lattice it is computed exactly at each pixel. Whole cycles and whole samples are removed in double precision or
-integers. Only the remaining fractions are in single precision. The accuracy therefore does not depend on the position
-of the scene or on the wavelength.
+Range profiles are upsampled so finely that a cubic B-spline, which has four taps, can interpolate them. The spectrum
+is divided by the transform of the spline, which is known in closed form. On a lattice of pixels, each line is divided
+into segments of 32 pixels. The range is computed exactly in the middle of a segment, and expanded to fourth order
+along the segment. For pixels that are not on a lattice, the range is computed exactly at each pixel. Whole cycles and
+whole samples are removed in double precision or in integers, and only the remaining fractions are in single
+precision. The accuracy therefore does not depend on the position of the scene or on the wavelength.
 """
 
 import math
@@ -55,7 +55,8 @@ _COUNTS_PER_CYCLE = 2.0**32  # a cycle in 32 bits, so that integer arithmetic dr
 class Lattice(NamedTuple):
     """Lattice of evenly spaced pixels at `origin` + i·`across` + j·`along`.
 
-    `origin`, `across` and `along` are vectors (3,). [m] `shape` is the number of values of i and of j.
+    `origin`, `across` and `along` [m] are vectors (3,). `shape` holds the number of values of i and the number of
+    values of j.
     """
 
     origin: Floats
@@ -66,7 +67,7 @@ class Lattice(NamedTuple):
     def disc(self) -> tuple[Floats, float]:
         """Centre (3,) and radius of a disc that contains all pixels. [m]
 
-        Each line of pixels is extended to a whole number of segments.
+        The disc also contains the pixels by which each line is extended to a whole number of segments.
         """
         i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
@@ -82,12 +83,13 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     points : (..., 3) ndarray
         Positions of the pixels. [m]
     tolerance : float
-        Largest distance of a pixel from its place on the lattice. [m]
+        Largest accepted distance of a pixel from its place on the lattice. [m]
 
     Returns
     -------
     Lattice or None
-        Lattice of points (n, 3) or (nx, ny, 3). None if they have another shape, are empty or are not evenly spaced.
+        Lattice of the points. None if their shape is neither (n, 3) nor (nx, ny, 3), or if they are empty or not
+        evenly spaced.
     """
     if points.ndim not in (2, 3) or points.size == 0:
         return None
@@ -106,20 +108,21 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
 
 
 def backproject(history: PhaseHistory, points: Floats) -> Complexes | None:
-    """Form an image by backprojection, as `image_formation.backprojection` does; all inputs must be finite.
+    """Form an image by backprojection, as in `image_formation.backprojection`. All inputs must be finite.
 
     Parameters
     ----------
     history : PhaseHistory
-        Frequencies evenly spaced.
+        Phase history; its frequencies must be evenly spaced.
     points : (..., 3) ndarray
-        Positions of the pixels. It is fastest if they are on a lattice. [m]
+        Positions of the pixels [m]. The computation is fastest if they are on a lattice.
 
     Returns
     -------
     (...) ndarray or None
-        Complex image. None if the pixels are so few and so far apart in range that refining the profiles between them
-        takes longer than computing each pixel separately, or takes more memory than a block of profiles.
+        Complex image. The result is None if the range profiles would have to be refined over a long interval for
+        only a few pixels, and if this refinement would take longer than computing each pixel separately, or more
+        memory than a block of profiles.
     """
     shape = points.shape[:-1]
     image = np.zeros(shape, dtype=complex)
@@ -161,9 +164,9 @@ def backproject(history: PhaseHistory, points: Floats) -> Complexes | None:
 def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
     """Upper bound of the fifth-order phase that the expansion of ranges over half a segment neglects. [rad]
 
-    The expansion of |r + x·e|/|r| in powers of x/|r| has the coefficients (P_{n-2} - P_n)/(2n - 1), with the Legendre
-    polynomials P_n of the cosine between r and the unit vector e. The result is infinite if a platform is too
-    near for the expansion to converge fast enough.
+    In the expansion of |r + x·e|/|r| in powers of x/|r|, the n-th coefficient is (P_{n-2} - P_n)/(2n - 1), where P_n
+    is the Legendre polynomial of the cosine of the angle between r and the unit vector e. The result is infinite if a
+    platform is too near for the expansion to converge fast enough.
     """
     centre, radius = lattice.disc()
     half = _SEGMENT_LENGTH / 2 * float(np.linalg.norm(lattice.along))
@@ -177,11 +180,11 @@ def _neglected_phase(history: PhaseHistory, lattice: Lattice) -> float:
 
 
 class _Block(NamedTuple):
-    """Refined range profiles of a block of pulses, with the platform positions and constants to interpolate them.
+    """Refined range profiles of a block of pulses, with platform positions and the constants for interpolation.
 
     `profiles` is (pulses, samples). A sample is a 64-bit integer that contains the real and the imaginary part in
-    single precision. `transmitter` and `receiver` are the measured positions, (pulses, 3). [m] `reference` is the
-    range sum of the scene centre, (pulses,). [m]
+    single precision. `transmitter` and `receiver` (pulses, 3) [m] are the measured positions. `reference` (pulses,)
+    [m] is the range sum of the scene centre.
     """
 
     profiles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
@@ -194,9 +197,9 @@ class _Block(NamedTuple):
 
 
 class _Needed(NamedTuple):
-    """Part of each range profile that the pixels need.
+    """Part of each range profile that is needed for the pixels.
 
-    `first` is the index of the first sample of the part, (pulses,). `samples` is the number of samples.
+    `first` is the index of the first sample of this part, (pulses,). `samples` is its number of samples.
     """
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -204,9 +207,9 @@ class _Needed(NamedTuple):
 
 
 def _needed(history: PhaseHistory, nearest: Floats, farthest: Floats, pixels: int) -> _Needed | None:
-    """Part of each range profile that pixels with range sums from `nearest` to `farthest` need.
+    """Part of each range profile that is needed for pixels with range sums from `nearest` to `farthest`.
 
-    Both range sums are (pulses,). [m] `pixels` is the number of pixels. The result is None if the part has too many
+    Both range sums are (pulses,) [m]. `pixels` is the number of pixels. The result is None if the part has too many
     samples for so few pixels. A profile is periodic, so if the part is longer than the profile, its samples repeat.
     """
     length = profile_length(history, _FFT_OVERSAMPLING_FACTOR)
@@ -233,7 +236,7 @@ def _reference(history: PhaseHistory) -> Floats:
 def _kernel(offset: Floats) -> Floats:
     """Interpolation kernel that refines range profiles: an exponential of a semicircle, 1 at the centre.
 
-    `offset` is the distance from the centre. [samples] The kernel is meant for offsets within ±_KERNEL_SAMPLES/2.
+    `offset` [samples] is the distance from the centre. The kernel is meant for offsets within ±_KERNEL_SAMPLES/2.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
     'exponential of semicircle' kernel", 2019. The shape parameter is the value that they give for this oversampling.
@@ -251,11 +254,11 @@ def _kernel_transform(angle: Floats) -> Floats:
 
 
 def _profile_blocks(history: PhaseHistory, needed: _Needed) -> Iterator[_Block]:
-    """Refine the part of each profile that the pixels need, in blocks of as many pulses as fit into a cache.
+    """Refine the part of each profile that is needed for the pixels, in blocks of as many pulses as fit into a cache.
 
-    The needed part is determined from the pixels and not from a sphere around the patch. A resolution cell may be a
-    hundred times longer than wide, and a sphere around such cells would need many more samples. All blocks share the
-    same memory, so a block must be used before the next is requested.
+    The part is determined from the pixels and not from a sphere around the patch. A resolution cell may be a hundred
+    times longer than wide, and a sphere around such cells would need many more samples. All blocks share the same
+    memory, so a block must be used before the next is requested.
     """
     length, factor, order = (
         profile_length(history, _FFT_OVERSAMPLING_FACTOR),
@@ -340,11 +343,11 @@ def _phasor(cycles):
 
 @_compiled
 def _expand(middle, platform, along, ranges):
-    """Add the range from one platform to `ranges`, expanded to fourth order along each segment of pixels.
+    """Add the range of one platform to `ranges`, as an expansion to fourth order along each segment of pixels.
 
-    `middle` (3, segments) holds the middles of the segments, and `along` is the vector from pixel to pixel. [m] Row 0
-    of `ranges` (5, segments) is the range at the middle. [m] Row n, from 1 to 4, is the coefficient of the n-th power
-    of the distance from the middle in pixels. [m/pixelⁿ]
+    `middle` (3, segments) [m] holds the midpoints of the segments, and `along` [m] is the vector from pixel to pixel.
+    Row 0 of `ranges` (5, segments) is the range [m] at the midpoint. Row n, for n from 1 to 4, is the coefficient
+    [m/pixelⁿ] of the n-th power of the distance from the midpoint in pixels.
     """
     px, py, pz = platform[0], platform[1], platform[2]
     ex, ey, ez = along[0], along[1], along[2]
@@ -367,9 +370,10 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
     """Split the ranges of segments into whole and fractional profile samples, and into fractions of carrier cycles.
 
     `ranges` holds the coefficients from `_expand`. Row 0 of `whole_samples` and `fraction` is the sample at the
-    middle of a segment; row 1 is the number of samples per pixel. `turn` holds the carrier cycles of orders 0 to 2,
-    without whole cycles, as integers in units of 2⁻³² cycles. `order` holds the carrier cycles of orders 2 to 4. All
-    are computed in double precision.
+    middle of a segment; row 1 is the number of samples per pixel. The range in carrier cycles is a polynomial in the
+    distance from the middle of a segment in pixels: `turn` holds its coefficients 0 to 2, without whole cycles, as
+    integers in units of 2⁻³² cycles, and `order` holds its coefficients 2 to 4. All results are computed in double
+    precision.
     """
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre
@@ -388,10 +392,12 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
 
 @_compiled
 def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index, between, cycles):
-    """Compute the profile sample before each pixel, the distance of the pixel from it, and the carrier cycles.
+    """Compute the position of each pixel in a range profile, and the carrier cycles of the pixel.
 
-    The results are written to `index`, `between` and `cycles`, (segments, pixels) each. The inputs are the results of
-    `_split`. Cycles up to second order are computed in integers, and higher orders in single precision.
+    The results are written to `index`, `between` and `cycles`, each (segments, pixels). `index` is the last profile
+    sample before the pixel, and `between` is the distance from there in samples. The inputs are the results of
+    `_split`. The carrier cycles are a polynomial in the distance from the middle of the segment in pixels. Its terms
+    up to the quadratic are computed in integers, and its cubic and quartic terms in single precision.
     """
     for i in range(between.shape[0]):
         base, step, start, slope = whole_samples[0, i], whole_samples[1, i], fraction[0, i], fraction[1, i]
@@ -411,7 +417,7 @@ def _sample_points(whole_samples, fraction, turn, order, cells_per_cycle, index,
 
 @_compiled
 def _cubic(v):
-    """Weights of the cubic B-spline for the samples -1, 0, 1 and 2, at a position v between samples 0 and 1."""
+    """Weights of a cubic B-spline for the samples -1, 0, 1 and 2, at a position `v` between samples 0 and 1."""
     u = _F(1) - v
     w0, w3 = u * u * u * _F(1 / 6), v * v * v * _F(1 / 6)
     w1 = _F(2 / 3) - v * v * (_F(1) - _F(0.5) * v)
@@ -424,7 +430,7 @@ def _cubic(v):
 
 @_compiled
 def _fetch(profile, index, fetched):
-    """Copy the four profile samples that each pixel needs to `fetched`."""
+    """Copy to `fetched` the four profile samples that are needed for the interpolation at each pixel."""
     for i in range(index.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             n = np.uint64(np.uint32(index[i, j] - _I(1)))
@@ -435,7 +441,7 @@ def _fetch(profile, index, fetched):
 
 @_compiled
 def _add_taps(taps, between, cycles, real, imag):
-    """Add the interpolated value of the profile, times the phasor of the carrier, to each pixel."""
+    """Add the interpolated profile, multiplied by the phasor of the carrier, to each pixel."""
     for i in range(real.shape[0]):
         for j in range(_SEGMENT_LENGTH):
             cosine, sine = _phasor(cycles[i, j])
@@ -498,11 +504,11 @@ def _sums(points, transmitter, receiver, reference, sums):
 
 
 def _boxes(lines: Floats) -> tuple[Floats, Floats]:
-    """Boxes around runs of successive pixels of `lines` (lines, pixels, 3), to bound the ranges of the pixels.
+    """Boxes around runs of successive pixels of `lines` (lines, pixels, 3), used to bound the ranges of the pixels.
 
-    A box is oriented along the horizontal direction from the first to the last pixel of its run. Boxes show quickly
-    which part of a range profile a patch needs. Finding this part from all pixels would take as long as forming an
-    image.
+    A box is oriented along the horizontal direction from the first to the last pixel of its run. With boxes, it takes
+    little time to find the part of a range profile that is needed for a patch. With all pixels, it would take as long
+    as forming an image.
 
     Returns
     -------
@@ -532,9 +538,9 @@ def _boxes(lines: Floats) -> tuple[Floats, Floats]:
 
 @_compiled
 def _leg(position, box, centres):
-    """Distance from a platform to the centre of a box [m], and the three components of the unit vector to the centre.
+    """Distance from a platform to the centre of a box [m], and components x, y and z of the unit vector towards it.
 
-    The unit vector is 0 if the distance is 0.
+    The components are 0 if the distance is 0.
     """
     x, y, z = centres[0, box] - position[0], centres[1, box] - position[1], centres[2, box] - position[2]
     distance = math.sqrt(x * x + y * y + z * z)
@@ -546,8 +552,8 @@ def _leg(position, box, centres):
 def _bend(distance, size):
     """Upper bound of the error of a linearised distance. [m]
 
-    The distance to a point is expanded to first order in the displacement of the point. `distance` is its value
-    without displacement, and `size` the largest displacement. [m]
+    The distance to a point is expanded to first order in a displacement of the point. `distance` [m] is the distance
+    without displacement, and `size` [m] is the length of the largest displacement.
     """
     return min(size, size * size / (2.0 * (distance - size))) if distance > size else 2.0 * size
 
@@ -556,8 +562,9 @@ def _bend(distance, size):
 def _reach(transmitter, receiver, centres, halves):
     """Smallest and largest range sum that pixels in the boxes can have at each pulse, as two arrays (pulses,). [m]
 
-    `centres` and `halves` are the results of `_boxes`. The range sum is convex, so it is never below its tangent
-    plane at the centre of a box. The range of each platform exceeds its tangent plane by at most `_bend`.
+    `centres` and `halves` are the results of `_boxes`. The range sum is a convex function of position, so it is never
+    below its linearisation at the centre of a box. The range of each platform exceeds its linearisation by at most
+    the result of `_bend`.
     """
     nearest, farthest = np.empty(transmitter.shape[0]), np.empty(transmitter.shape[0])
     for pulse in prange(transmitter.shape[0]):
@@ -581,7 +588,7 @@ def _reach(transmitter, receiver, centres, halves):
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
     """Convert range sums of pixels to positions in a range profile, and to fractions of a carrier cycle.
 
-    `sums` are the range sums. [m] `index` receives the index of the last profile sample before each pixel, `between`
+    `sums` [m] are the range sums. `index` receives the index of the last profile sample before each pixel, `between`
     the distance from this sample to the pixel in samples, and `turn` the fraction of a carrier cycle.
     """
     for i in range(index.shape[0]):
@@ -595,7 +602,7 @@ def _split_points(sums, per_metre, first, cycles, index, between, turn):
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, image):
-    """Add the contributions of a block of pulses to scattered pixels, (3, n), each at its exact range."""
+    """Add the contributions of a block of pulses to scattered pixels, (3, n), from the exact range of each pixel."""
     for tile in prange((image.shape[0] + _TILE_ROWS * _SEGMENT_LENGTH - 1) // (_TILE_ROWS * _SEGMENT_LENGTH)):
         start = tile * _TILE_ROWS * _SEGMENT_LENGTH
         count = min(_TILE_ROWS * _SEGMENT_LENGTH, image.shape[0] - start)

@@ -1,7 +1,7 @@
-"""Image formation with plane waves (far field): the filter (7), (12) and the polar format (13), (14).
+"""Image formation with plane waves (far field): the filter (7) or (12), and the polar format (13), (14).
 
-The equations are those of Rigling & Moses. Both methods defocus and displace points that are not at the scene centre,
-because of the approximation (5).
+Numbers in brackets are those of the equations of Rigling & Moses. Both methods use the approximation (5), and
+therefore defocus and displace points that are not at the scene centre.
 """
 
 import math
@@ -27,12 +27,12 @@ _STENCIL_SAMPLES = 12  # samples that one interpolation uses
 def far_field_filter(
     history: PhaseHistory, points: Floats, method: Literal["auto", "direct", "nufft"] = "auto"
 ) -> Complexes:
-    """Form an image by the far-field filter (7), which for points on the ground is (12).
+    """Form an image by the far-field filter of equation (7), which becomes equation (12) for points on the ground.
 
     Parameters
     ----------
     history : PhaseHistory
-        Frequencies may be spaced unevenly.
+        Phase history; its frequencies may be unevenly spaced.
     points : (..., 3) ndarray
         Positions of the pixels. [m]
     method : "auto", "direct" or "nufft"
@@ -48,7 +48,7 @@ def far_field_filter(
     Raises
     ------
     ValueError
-        A position that is not finite.
+        A position is not finite.
     ImportError
         `method` is "nufft" and finufft is not installed.
     """
@@ -76,11 +76,12 @@ def is_nonuniform() -> bool:
 
 
 def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: bool) -> Complexes | None:
-    """Compute the image (7) at points (n, 3) by a non-uniform FFT, (n,); None if the FFT grid would be too large.
+    """Compute the image of equation (7) at points (n, 3) by a non-uniform FFT. The result has the shape (n,).
 
-    The size of the grid is only checked if `bounded` is true. It grows with the area of the box around the points
-    times the area of the box around the wavenumbers. Both boxes have sides along and across the look direction. With
-    other directions, a patch whose resolution cells are kilometres long would need millions of grid cells.
+    The result is None if the FFT grid would be too large; this is checked only if `bounded` is true. The size of the
+    grid is proportional to the area of a box around the points times the area of a box around the wavenumbers. Both
+    boxes are aligned with the look direction. With any other orientation, a patch whose resolution cells are
+    kilometres long would need millions of grid cells.
     """
     import finufft
 
@@ -109,9 +110,9 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
 
 
 class PolarFormat(NamedTuple):
-    """Image (nx, ny) formed by the polar format, and the frequency grid (13) from which it was formed.
+    """Image (nx, ny) formed by the polar format, and the frequency grid of equation (13) from which it was formed.
 
-    `frequency_x` (Nx,) are the frequencies f′x of the grid, and `frequency_y` (Ny,) the frequencies f′y. [Hz]
+    `frequency_x` (Nx,) and `frequency_y` (Ny,) are the frequencies f′x and f′y of the grid. [Hz]
     """
 
     image: Complexes
@@ -126,35 +127,36 @@ def polar_format(
     shape: tuple[int, int],
     centre: GroundVector = (0.0, 0.0),
 ) -> PolarFormat:
-    """Form an image by (14): interpolate samples to the rectangular grid (13) of the rotated frame, then use an FFT.
+    """Form an image by the polar format: interpolate to the frequency grid (13), then apply the FFT of (14).
 
-    The grid is a rectangle within the recorded frequencies, so it omits the corners of the aperture. The omitted part
-    increases with the relative bandwidth and with the squint. The frequency step of the grid is c/(2·size), so the
-    image is periodic, and its period is its own size.
+    The grid is a rectangle in the rotated frame within the recorded frequencies, so it omits the corners of the
+    aperture. The omitted part increases with the relative bandwidth and with the squint. The frequency step of the
+    grid is c/(2·size), so the image is periodic with a period of `size`.
 
     Parameters
     ----------
     history : PhaseHistory
-        Frequencies and pulses evenly spaced.
+        Phase history; its frequencies and pulses must be evenly spaced.
     look_azimuth : float
-        φ_b of (11). [rad]
+        Bistatic look direction φ_b of equation (11). [rad]
     size : (2,) float
         Extent along x′ and y′, centred on the patch. [m]
     shape : (2,) int
         Number of pixels along x′ and y′. The pixels are those of `ground_grid(centre, look_azimuth, size, shape)`.
     centre : (2,) float
-        Centre of the patch, east and north. [m] The phase of a plane wave at the centre is removed from the samples
+        Centre of the patch, east and north [m]. The phase of a plane wave at the centre is removed from the samples
         before they are interpolated. This is equivalent to (14) at shifted pixels, with the same approximation (5).
 
     Returns
     -------
     PolarFormat
+        Image, and the frequency grid from which it was formed.
 
     Raises
     ------
     ValueError
         The line of sight does not turn steadily over the aperture, no rectangle fits into the recorded frequencies,
-        or the pixels are coarser than the resolution of the rectangle.
+        or the pixel spacing is coarser than the resolution of the rectangle.
     """
     cosine, sine = math.cos(look_azimuth), math.sin(look_azimuth)
     east, north = look_sum(history.transmitter, history.receiver)[:, :2].T / 2
@@ -203,7 +205,7 @@ def polar_format(
 
 
 def _grid(low: float, high: float, step: float) -> Floats:
-    """Multiples of the frequency step `step` between the bounds `low` and `high`; may be empty. [Hz]
+    """Multiples of a frequency step between the bounds `low` and `high` [Hz]. The result may be empty.
 
     An FFT of samples at these frequencies has no carrier.
     """
@@ -219,10 +221,10 @@ def _interpolated(rows: Complexes, positions: Floats) -> Complexes:
     Parameters
     ----------
     rows : (rows, samples) ndarray
-        Samples, at least about twice as dense as necessary. The scene is then at most half as large as the sampling
-        allows.
+        Samples, at least about twice as dense as the sampling theorem requires. The scene is then at most half as
+        large as the sampling would allow.
     positions : (rows, points) ndarray
-        Positions along the rows. [samples]
+        Positions along each row at which to interpolate. [samples]
     """
     first = np.clip(
         np.floor(positions).astype(np.int64) - _STENCIL_SAMPLES // 2 + 1, 0, rows.shape[1] - _STENCIL_SAMPLES

@@ -1,4 +1,4 @@
-"""Conversion of the errors of a mission to the path and clock errors that the simulator applies to an image."""
+"""Conversion of the errors of a mission to the path and clock errors that the simulator applies to the data."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -15,14 +15,14 @@ _MOTION_SAMPLES = 513  # of the smooth motion that a registered kind states
 
 
 def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture_time_s: float) -> Errors:
-    """Convert a single error of a given size to the path or clock errors that the simulator applies to an image.
+    """Convert a single error of a given size to the path or clock errors that the simulator applies to the data.
 
     Parameters
     ----------
     source : ErrorSource
         Error of a platform, a clock or the terrain. It must displace the image point (`source.displaces` is true).
     size : float
-        Signed size in the unit of the error, coverage factor included.
+        Signed size in the unit of the error, including the coverage factor.
     geometry : BistaticGeometry
         True paths of the mission.
     aperture_time_s : float
@@ -62,8 +62,8 @@ def _times(size: float, vector: Vectors) -> Vector:
 def flown_together(
     sizes: Iterable[tuple[ErrorSource, float]], geometry: BistaticGeometry, aperture_time_s: float
 ) -> Errors:
-    """Convert several errors of given sizes to the total errors that the simulator applies to an image.
+    """Convert several errors of given sizes to the total errors that the simulator applies to the data.
 
-    `sizes` are pairs of an error and its signed size. The remaining arguments are those of `flown`.
+    `sizes` holds pairs of an error and its signed size. The remaining arguments are those of `flown`.
     """
     return superposed(flown(source, size, geometry, aperture_time_s) for source, size in sizes)

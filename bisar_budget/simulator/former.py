@@ -1,9 +1,9 @@
-"""Image formers with a common interface: the pixels, the ground point at which a target appears, and the image.
+"""Image formers with a common interface for pixels, displaced points, resolution and images.
 
-Images are at baseband. With exact ranges, (4), a target appears at its displaced point, and the pixels are along
-lines of equal range. With plane waves, (7) to (14), a target appears at the point whose plane-wave range history
-matches the recorded range history, and the pixels are along the axes (x′, y′) of (10). Ground points are given as
-east and north. [m]
+Images are at baseband. With exact ranges, equation (4), a target appears at its displaced point, and the pixels are
+along lines of equal range. With plane waves, equations (7) to (14), a target appears at the point whose plane-wave
+range history is the best fit to the recorded range history, and the pixels are along the axes (x′, y′) of equation
+(10). Ground points are given as east and north. [m]
 """
 
 import math
@@ -35,9 +35,9 @@ OnPixels = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactRangeFormer:
-    """Image former by exact ranges: matched filter (4), or backprojection, which gives the same image.
+    """Image former with exact ranges: matched filter (4), or backprojection, which gives the same image.
 
-    `is_direct` selects the matched filter. `kernel` is the kernel of the backprojection.
+    `is_direct` selects the matched filter. `kernel` is the interpolation kernel of the backprojection.
     """
 
     lines: RangeLines
@@ -51,16 +51,16 @@ class ExactRangeFormer:
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point at which the image shows a target, east and north. [m]
+        """Ground point at which a target appears in the image, east and north. [m]
 
-        For exact ranges it is the argument `displaced`, the displaced point of the target.
+        With exact ranges this is `displaced`, the displaced point of the target.
         """
         return displaced
 
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
         """Recorded range history of a target minus the range history that the former assumes for `ground_point`. [m]
 
-        For exact ranges it is the argument `remaining_range`, which is this difference at the displaced point.
+        With exact ranges this is the argument `remaining_range`, the difference at the displaced point.
         """
         return remaining_range
 
@@ -69,7 +69,7 @@ class ExactRangeFormer:
         return self.lines.cells(centre, self.radar)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cell sizes along x′ and y′ that set the pixel spacing; they do not exceed the resolution. [m]"""
+        """Cell sizes along x′ and y′ that set the pixel spacing. They are at most as large as the resolution. [m]"""
         return self.lines.sampled(centre, self.radar)
 
     def look(self, centre: GroundVector) -> Floats:
@@ -88,12 +88,12 @@ class ExactRangeFormer:
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
         """Form the baseband image (nx, ny) at the pixel positions `grid`, (nx, ny, 3). [m]
 
-        `on_pixels` is called with the number of pixels of each block that is formed.
+        The image is formed in blocks. After each block `on_pixels` is called with the number of its pixels.
         """
         return _in_blocks(lambda block: self._formed(history, block), grid, on_pixels)
 
     def seconds(self, trial_history: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """Estimate the time to form an image from `pulses` pulses, measured in a trial with few pulses. [s]"""
+        """Estimate the time to form an image from `pulses` pulses, based on a timed trial with few pulses. [s]"""
         is_quick = not self.is_direct and self.kernel != "numpy"
         return _extrapolated(
             self._formed, trial_history, pulses, grid, _COMPILED_TRIAL_PIXELS if is_quick else _TRIAL_PIXELS
@@ -107,11 +107,11 @@ class ExactRangeFormer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneWaves:
-    """Image former by plane waves: far-field filter (12), or polar format (13) and (14).
+    """Image former with plane waves: far-field filter (12), or polar format (13) and (14).
 
-    `sight` (times, 2) are the ground components of the sum of the unit vectors from the scene centre to both
-    platforms, for the measured paths. The number of slow times is odd, and the middle slow time is mid-aperture.
-    `is_polar` selects the polar format.
+    `sight` (times, 2) holds the horizontal components of a sum of two unit vectors: from the scene centre to the
+    transmitter and to the receiver, both on their measured paths. The number of slow times is odd, so that the middle
+    one is mid-aperture. `is_polar` selects the polar format.
     """
 
     sight: Floats
@@ -122,20 +122,20 @@ class PlaneWaves:
 
     @property
     def middle(self) -> Floats:
-        """Ground components of the sum of the unit vectors to both platforms at the aperture midpoint, (2,)."""
+        """Ground components of the sum of the unit vectors to both platforms at mid-aperture, (2,)."""
         towards: Floats = self.sight[len(self.sight) // 2]
         return towards
 
     @property
     def azimuth(self) -> float:
-        """Bistatic look direction φ_b of (11), for the measured paths. [rad]"""
+        """Bistatic look direction φ_b of equation (11), computed from the measured paths. [rad]"""
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Ground point at which the image shows a target, east and north. [m]
+        """Ground point at which a target appears in the image, east and north. [m]
 
-        At this point the plane-wave model (5) fits the range history `recorded` [m] best: the variance of the
-        residual phase is smallest.
+        At this point the plane-wave model (5) is the best fit to the range history `recorded` [m]: the variance of
+        the residual phase is smallest.
         """
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
@@ -147,8 +147,8 @@ class PlaneWaves:
     def remaining_range(self, ground_point: GroundVector, remaining_range: Floats, recorded: Floats) -> Floats:
         """Recorded range history of a target minus the plane-wave range history of `ground_point`. [m]
 
-        `recorded` is the range history relative to that of the scene centre. [m] The result includes the error of the
-        far-field approximation.
+        `recorded` [m] is the range history relative to the range history of the scene centre. The result includes the
+        error of the far-field approximation.
         """
         range_history: Floats = recorded + self.sight @ np.asarray(ground_point)
         return range_history
@@ -160,29 +160,32 @@ class PlaneWaves:
         return float(along), float(across)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
-        """Cell sizes along x′ and y′ that set the pixel spacing; they are equal to the resolution. [m]"""
+        """Cell sizes along x′ and y′ that set the pixel spacing. They are equal to the resolution. [m]"""
         return self.cells(centre)
 
     def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′, a unit vector (2,) towards the platforms; it is the same at all points."""
+        """Direction of x′, a unit vector (2,) towards the platforms. It is the same at all points."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Signed distances of ground points (n, 2) from a centre along x′ and y′ of (10), in resolution cells."""
+        """Signed distances of ground points from a centre along x′ and y′ of equation (10), in resolution cells.
+
+        The points and the result are (n, 2).
+        """
         cosine, sine = self.look(centre)
         rotated = (ground_points - np.asarray(centre)) @ np.array([[cosine, -sine], [sine, cosine]])
         return np.asarray(rotated / np.array(self.cells(centre)))
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels of a patch along the axes x′ and y′ of (10), (nx, ny, 3). [m]"""
+        """Pixels of a patch along the axes x′ and y′ of equation (10), (nx, ny, 3). [m]"""
         size = (spacing[0] * shape[0], spacing[1] * shape[1])
         return ground_grid(centre, self.azimuth, size, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, on_pixels: OnPixels) -> Complexes:
         """Form the baseband image (nx, ny) at the pixel positions `grid`, (nx, ny, 3). [m]
 
-        The polar format requires positions returned by the method `grid`. `on_pixels` is called with the number of
-        pixels of each block that is formed.
+        For the polar format, `grid` must be a result of the method `grid`. After each block of the image `on_pixels`
+        is called with the number of its pixels.
         """
         if not self.is_polar:
             return _in_blocks(lambda block: far_field_filter(history, block) * self._carrier(block), grid, on_pixels)
@@ -200,7 +203,7 @@ class PlaneWaves:
         """Estimate the time to form an image from `pulses` pulses. [s]
 
         If the image is formed by Fourier transforms, the time is estimated from the numbers of samples and pixels.
-        The far-field filter without finufft is timed in a trial with few pulses.
+        Otherwise, for the far-field filter without finufft, it is extrapolated from a timed trial with few pulses.
         """
         if not self.is_polar and not is_nonuniform():
             return _extrapolated(far_field_filter, trial_history, pulses, grid, _TRIAL_PIXELS)
@@ -211,7 +214,7 @@ class PlaneWaves:
     def _carrier(self, points: Floats) -> Complexes:
         """Phasor that removes the phase of the plane-wave range at mid-aperture from an image at points (..., 3).
 
-        It corresponds to `RangeLines.baseband`, which uses exact ranges.
+        It is the counterpart of `RangeLines.baseband`, which uses exact ranges.
         """
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT_MPS
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
@@ -228,10 +231,10 @@ def _extrapolated(
     grid: Floats,
     trial_count: int,
 ) -> float:
-    """Estimate the time to form a full image, from a trial with few pixels and few pulses. [s]
+    """Estimate the time to form a full image, based on a timed trial with few pixels and few pulses. [s]
 
-    The second run of the trial is timed, because the first may include compilation. `trial_count` is the largest
-    number of pixels of the trial.
+    The trial is run twice and the second run is timed, because the first may include compilation. `trial_count` is
+    the largest number of pixels in the trial.
     """
     trial_pixels = grid[: max(1, trial_count // grid.shape[1]), :trial_count]
     form(trial_history, trial_pixels)

@@ -1,6 +1,7 @@
 """Image formation by the matched filter (4) of Rigling & Moses, which is exact, and by backprojection, which is fast.
 
-Both use the measured positions, as a processor must. A point scatterer of amplitude A has the peak |A|.
+Both use the measured platform positions, because a real processor does not know the actual positions. The image of a
+point scatterer of amplitude A has a peak of |A|.
 """
 
 import math
@@ -26,9 +27,9 @@ Kernel = Literal["auto", "numpy", "cubic"]
 
 
 def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Floats:
-    """Exact differential range ΔR of points (n, 3) at a pulse: range sum minus that of the scene centre, (n,). [m]
+    """Exact differential range ΔR of points (n, 3) at a pulse, (n,). [m]
 
-    The measured positions of the platforms are used.
+    It is the range sum of a point minus the range sum of the scene centre, for the measured platform positions.
     """
     total: Floats = np.zeros(len(points))
     for position in (history.transmitter[pulse], history.receiver[pulse]):
@@ -37,12 +38,12 @@ def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Flo
 
 
 def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
-    """Form an image by (4): the sum over pulses and frequencies, without approximation.
+    """Form an image by the matched filter of equation (4), a sum over pulses and frequencies without approximation.
 
     Parameters
     ----------
     history : PhaseHistory
-        Recorded data. A window, if wanted, must already be applied to the samples.
+        Recorded data. If a window is used, it must already have been applied to the samples.
     points : (..., 3) ndarray
         Positions of the pixels. [m]
 
@@ -57,9 +58,9 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
-    """Form an image (n,) at points (n, 3) by the sum of (4) over pulses and frequencies.
+    """Form an image (n,) at points (n, 3) by the sum of equation (4) over pulses and frequencies.
 
-    `ranges(points, pulse)` gives the differential ranges ΔR at a pulse, (n,). [m]
+    `ranges(points, pulse)` returns the differential ranges ΔR at a pulse, (n,). [m]
     """
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
@@ -79,21 +80,22 @@ def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, 
 
 
 def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto") -> Complexes:
-    """Form an image by interpolation of range profiles; it equals (4) to -120 dB at a fraction of the cost.
+    """Form an image by backprojection. It agrees with equation (4) to -120 dB and takes a fraction of the time.
 
     The spectrum of each pulse is divided by the transform of a spline and transformed to a range profile by FFT. The
-    profile is interpolated at the differential ranges of the pixels. A profile repeats every c/Δf in range, with the
-    frequency step Δf. Pixels that are farther apart alias; the caller must prevent this.
+    profile is interpolated at the differential ranges of the pixels. Profiles repeat every c/Δf in range, where Δf is
+    the frequency step. The caller must make sure that pixels are not farther apart than this, because they would
+    alias.
 
     Parameters
     ----------
     history : PhaseHistory
-        Frequencies evenly spaced.
+        Phase history; its frequencies must be evenly spaced.
     points : (..., 3) ndarray
         Positions of the pixels. [m]
     kernel : "auto", "numpy" or "cubic"
-        "numpy" works for all pixels. "cubic" uses a cubic spline and is compiled by Numba (extra `fast`). "auto" is
-        "cubic" if Numba is installed, else "numpy".
+        "numpy" works for all pixels. "cubic" uses a cubic spline and is compiled by Numba (extra `fast`). "auto"
+        means "cubic" if Numba is installed, and "numpy" otherwise.
 
     Returns
     -------
@@ -103,7 +105,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
     Raises
     ------
     ValueError
-        A position that is not finite.
+        A position is not finite.
     ImportError
         `kernel` is "cubic" and Numba is not installed.
     """
@@ -124,9 +126,9 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Choose the backprojection kernel, "cubic" or "numpy", that fits a memory limit. [B]
+    """Choose the backprojection kernel, "cubic" or "numpy", for a memory limit. [B]
 
-    The compiled kernel is chosen only with ample memory, because its code takes 60 MB.
+    The compiled kernel "cubic" is chosen only if there is ample memory, because its code takes 60 MB.
     """
     return "cubic" if is_compiled() and memory_limit >= _SPACIOUS_BYTES else "numpy"
 
@@ -138,7 +140,10 @@ def bytes_held(kernel: Kernel) -> float:
 
 @cache
 def is_compiled() -> bool:
-    """Whether compiled kernels are available: Numba is installed, has enough memory and can cache compiled code."""
+    """Whether compiled kernels are available.
+
+    Numba must be installed, memory must be sufficient, and it must be possible to cache compiled code.
+    """
     if not is_spacious():
         return False
     try:
@@ -174,10 +179,10 @@ def _backprojection(history: PhaseHistory, points: Floats) -> Complexes:
 
 
 def _read(spline: Complexes, cell: Floats) -> Complexes:
-    """Evaluate a periodic cubic B-spline at fractional sample positions `cell`; both arrays are (n,).
+    """Evaluate a periodic cubic B-spline at fractional sample positions `cell` (n,). The result has the shape (n,).
 
-    `spline` (samples + 3,) are the coefficients at the samples. They are extended periodically by one coefficient at
-    the start and two at the end.
+    `spline` (samples + 3,) holds the coefficients at the samples, extended periodically by one coefficient at the
+    start and two at the end.
     """
     first = np.floor(cell)
     fraction = cell - first
@@ -197,9 +202,9 @@ def _read(spline: Complexes, cell: Floats) -> Complexes:
 
 # ---------------------------------------------------------------------- range profiles
 def profile_length(history: PhaseHistory, oversampling: int) -> int:
-    """Number of samples of a range profile over its period c/Δf: a power of two.
+    """Number of samples of a range profile over its period c/Δf; always a power of two.
 
-    It is at least `oversampling` times the number of frequencies.
+    The number is at least `oversampling` times the number of frequencies.
     """
     return 1 << (history.frequency.size * oversampling - 1).bit_length()
 
@@ -213,17 +218,17 @@ def cells_per_metre(history: PhaseHistory, length: int) -> float:
 def carrier_frequency(history: PhaseHistory) -> float:
     """Carrier frequency that is removed from range profiles: the frequency of the middle sample. [Hz]
 
-    It is not the centre of the band if the number of frequencies is even.
+    If the number of frequencies is even, this is not the centre of the band.
     """
     return float(history.frequency[history.frequency.size // 2])
 
 
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
-    """Range profiles of some pulses: Σ S_k exp(+2πj k n/length), where k counts frequencies from the carrier.
+    """Range profiles of selected pulses: Σ S_k exp(+2πj k n/length), where k counts frequencies from the carrier.
 
-    A profile is the sum of (4) over frequency, without the carrier, as a function of ΔR. It is oversampled, and is
-    later interpolated by convolution with a short kernel. The samples S_k are therefore first divided by the
-    transform of this kernel.
+    A profile is the sum over frequency in equation (4), without the carrier, as a function of ΔR. It is oversampled,
+    and will be interpolated by convolution with a short kernel. To compensate for this kernel, the samples S_k are
+    first divided by its transform.
 
     Parameters
     ----------
@@ -232,14 +237,14 @@ def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses
     length : int
         Number of samples of a profile.
     transform : (frequencies,) ndarray
-        Fourier transform of the interpolation kernel, at the indices that `harmonics` gives.
+        Fourier transform of the interpolation kernel, at the indices returned by `harmonics`.
     pulses : slice
-        Pulses whose profiles are computed.
+        Pulses for which profiles are computed.
 
     Returns
     -------
     (pulses, length) ndarray
-        Sample n is at ΔR = n / `cells_per_metre`. The profiles are periodic.
+        Periodic range profiles. Sample n is at ΔR = n / `cells_per_metre`.
     """
     samples = history.samples[pulses]
     spectrum = np.zeros((samples.shape[0], length), dtype=complex)
@@ -259,23 +264,23 @@ def harmonics(history: PhaseHistory) -> np.ndarray[tuple[int], np.dtype[np.int64
 def ground_grid(
     centre: tuple[float, float], look_azimuth: float, size: tuple[float, float], shape: tuple[int, int]
 ) -> Floats:
-    """Pixels of a ground patch in the rotated frame (x′, y′) of (10), z = 0.
+    """Pixels of a ground patch (z = 0) in the rotated frame (x′, y′) of equation (10).
 
     Parameters
     ----------
     centre : (2,) float
-        East, north. [m]
+        East and north of the centre of the patch. [m]
     look_azimuth : float
-        Direction of x′; 0 gives the frame (x, y). [rad]
+        Direction of x′ [rad]. The value 0 gives the frame (x, y).
     size : (2,) float
         Extent along x′ and y′. [m]
     shape : (2,) int
-        Pixels along x′ and y′.
+        Number of pixels along x′ and y′.
 
     Returns
     -------
     (nx, ny, 3) ndarray
-        East, north, up. [m]
+        East, north and up of each pixel. [m]
     """
     along, across = ((np.arange(n) - n // 2) * (extent / n) for n, extent in zip(shape, size, strict=True))
     x, y = np.meshgrid(along, across, indexing="ij")
@@ -284,16 +289,16 @@ def ground_grid(
 
 
 def taylor_window(count: int, sidelobe_db: float = -35.0, nbar: int = 5) -> Floats:
-    """Taylor weights with a mean of 1, so that the response of a point keeps its peak, (count,).
+    """Taylor window weights (count,) with a mean of 1, so that the peak of a point response is unchanged.
 
     Parameters
     ----------
     count : int
-        Number of samples, which are at the centres of equal cells.
+        Number of samples. They are at the centres of equal cells.
     sidelobe_db : float
         Level of the near sidelobes relative to the peak, a negative number. [dB]
     nbar : int
-        Number of sidelobes at that level, plus one.
+        Number of near sidelobes at this level, plus one.
 
     Notes
     -----

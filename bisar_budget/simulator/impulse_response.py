@@ -1,13 +1,13 @@
-"""Measures of a point response: width, peak, and sidelobe ratios.
+"""Measures of a point response: width, peak and sidelobe ratios.
 
 A cut is a line of evenly spaced complex image samples that contains the full response. Sidelobes are measured outside
-a mask around the mainlobe. The mask is either fixed, from the first nulls of the error-free response, or given by the
-nulls of the response itself. If an image is formed with a window, a mask from its own nulls hides a quadratic phase
-error, because the shoulder that the error raises merges with the mainlobe.
+a mask that covers the mainlobe. The mask is either fixed, with edges at the first nulls of the error-free response,
+or it has edges at the nulls of the measured response itself. If an image is formed with a window, a mask of the
+second kind conceals a quadratic phase error, because the shoulder raised by the error merges with the mainlobe.
 
-Other tools measure sidelobes only up to a distance from the peak. For example, perseo-quality computes its PSLR
-within five widths of the peak and its ISLR within ten. For a uniform aperture its ISLR is therefore -10.21 dB, not
--9.68 dB.
+Other tools measure sidelobes only up to a certain distance from the peak. For example, perseo-quality computes its
+PSLR within five widths of the peak and its ISLR within ten. For a uniform aperture its ISLR is therefore -10.21 dB
+instead of -9.68 dB.
 """
 
 import math
@@ -36,10 +36,10 @@ _TAPS_COUNT = 6  # the error is -70 dB for three samples per cell
 class ImpulseResponse:
     """Width, peak and sidelobe ratios of a point response along one cut.
 
-    `irw_m` is the width at half power. [m] `peak` is the magnitude of the peak. `peak_m` is its position along the
-    cut, relative to the middle sample. [m] `mask_m` is the half width of the mainlobe mask. [m] `pslr_db` and
-    `islr_db` are the peak and the integrated sidelobe ratio outside the mask. [dB] The integrated ratio is the energy
-    of the sidelobes divided by the energy of the mainlobe.
+    `irw_m` [m] is the width at half power. `peak` is the magnitude of the peak, and `peak_m` [m] is its position
+    along the cut relative to the middle sample. `mask_m` [m] is the half width of the mainlobe mask. `pslr_db` and
+    `islr_db` [dB] are the peak and integrated sidelobe ratios. Sidelobes are counted outside the mask; the integrated
+    ratio is their energy divided by the energy of the mainlobe.
     """
 
     irw_m: float
@@ -51,9 +51,9 @@ class ImpulseResponse:
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
-    """Upsample periodic cuts (..., samples) by an integer factor, (..., samples · factor).
+    """Upsample periodic cuts (..., samples) by an integer factor. The result has the shape (..., samples · factor).
 
-    A cut must be a full period. Its spectrum may be centred anywhere in the sampling band.
+    A cut must cover a full period. Its spectrum may be centred anywhere in the sampling band.
     """
     count = cut.shape[-1]
     steps = np.arange(count * factor) / factor
@@ -67,11 +67,11 @@ def upsampled(cut: Complexes, factor: int) -> Complexes:
 
 
 def _kernel(offset: Floats) -> Floats:
-    """Weights (n, taps) that interpolate at offsets (n,) from a sample: a sinc function with a Kaiser window.
+    """Interpolation weights (n, taps) at offsets (n,) from a sample: a sinc function with a Kaiser window.
 
     The offsets are in samples. The kernel is short on purpose. Interpolation by a Fourier transform of the full line
-    would be exact only if the line were periodic. But an image is cut off within its sidelobes, and near a platform
-    its band changes along the line, so distant samples would add errors.
+    would be exact only for a periodic line. An image, however, is cut off within its sidelobes, and its band changes
+    along the line near a platform, so that distant samples would add errors.
     """
     distances = np.subtract.outer(offset, np.arange(1 - _REACH_SAMPLES, _REACH_SAMPLES + 1))
     inside = np.sqrt(np.maximum(1 - (distances / _REACH_SAMPLES) ** 2, 0))
@@ -80,15 +80,15 @@ def _kernel(offset: Floats) -> Floats:
 
 
 def _carrier_of(cut: Complexes) -> int:
-    """Signed FFT bin at the centre of gravity of the power spectra of all cuts (..., samples)."""
+    """Signed FFT bin at the centre of gravity of the power spectrum, summed over all cuts (..., samples)."""
     return _carrier(np.abs(np.fft.fft(cut).reshape(-1, cut.shape[-1])) ** 2)
 
 
 def _carrier(power: Floats) -> int:
     """Signed FFT bin at the centre of gravity of the sum of power spectra (lines, bins).
 
-    It is computed on a circle, because the spectrum is periodic. The empty bins are on the opposite side of the
-    circle.
+    The spectrum is periodic, so its bins are treated as points on a circle, and the empty bins are opposite to the
+    result.
     """
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)
@@ -100,7 +100,7 @@ def _carrier(power: Floats) -> int:
 def impulse_response(
     cut: Complexes, spacing_m: float, mask_m: float | None = None, reach_m: float | None = None
 ) -> ImpulseResponse:
-    """Measure a cut through the peak of a response.
+    """Measure width, peak and sidelobe ratios of a cut through the peak of a response.
 
     Parameters
     ----------
@@ -109,19 +109,20 @@ def impulse_response(
     spacing_m : float
         Distance between samples. [m]
     mask_m : float, optional
-        Half width of the mainlobe mask. [m] None uses the nulls of this response.
+        Half width of the mainlobe mask [m]. If it is None, the mask ends at the nulls of this response.
     reach_m : float, optional
-        Distance from the peak up to which sidelobes are counted. [m] None counts the whole cut.
+        Distance from the peak up to which sidelobes are counted [m]. If it is None, the whole cut is used.
 
     Returns
     -------
     ImpulseResponse
+        Width, peak and sidelobe ratios.
 
     Raises
     ------
     ValueError
         The samples of the cut are all zero or not finite. Or the peak, its half-power points or its mask are at the
-        edge of the cut, or `reach_m` extends beyond it.
+        edge of the cut, or `reach_m` extends beyond the cut.
     """
     _check(cut)
     fine = np.abs(upsampled(cut, _UPSAMPLING_FACTOR))
@@ -158,7 +159,7 @@ def impulse_response(
 
 
 def line_at(chip: Complexes, row: float | Floats) -> Complexes:
-    """Interpolate the line (ny,) of an image (nx, ny) at a fractional row; rows (n,) give lines (n, ny)."""
+    """Interpolate the line (ny,) of an image (nx, ny) at a fractional row. For n rows the result is (n, ny)."""
     count = chip.shape[0]
     turn = 2j * math.pi / count * _carrier_of(chip.T)
     rows = np.atleast_1d(row)
@@ -173,8 +174,8 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) ->
     """Fractional row of the peak within a window (rows, columns) of an image (nx, ny).
 
     The row is counted from the first row of the image. The interpolation treats the rows of the image and the columns
-    of the window as periodic. The peak is usually between two lines of pixels. With lines a third of a resolution
-    cell apart, the nearer line may be 0.4 dB below the peak.
+    of the window as periodic. Interpolation is needed because the peak is usually between two lines of pixels: if
+    lines are a third of a resolution cell apart, the nearest line may be 0.4 dB below the peak.
     """
     magnitude = np.abs(image[window])
     row = float(np.argmax(magnitude.max(axis=1))) + window[0].indices(image.shape[0])[0]
@@ -187,7 +188,7 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _FULL_WINDOW) ->
 
 
 def place_of_peak(image: Complexes) -> tuple[float, float]:
-    """Fractional row and column of the interpolated peak of an image (nx, ny), which is treated as periodic."""
+    """Fractional row and column of the interpolated peak of an image (nx, ny). The image is treated as periodic."""
     row = row_of_peak(image)
     power = np.abs(upsampled(line_at(image, row), _UPSAMPLING_FACTOR)) ** 2
     top = int(np.argmax(power))
@@ -195,7 +196,7 @@ def place_of_peak(image: Complexes) -> tuple[float, float]:
 
 
 def highest(chip: Complexes) -> float:
-    """Largest magnitude of a small image (nx, ny) after interpolation in both axes."""
+    """Largest magnitude of a small image (nx, ny), interpolated in both axes."""
     columns = upsampled(chip, _CHIP_UPSAMPLING_FACTOR).T
     blocks = (columns[start : start + _BLOCK_COLUMNS] for start in range(0, len(columns), _BLOCK_COLUMNS))
     return max(float(np.abs(upsampled(block, _CHIP_UPSAMPLING_FACTOR)).max()) for block in blocks)
@@ -227,7 +228,7 @@ def _null(power: Floats, top: int, direction: int) -> float:
 
 
 def _vertex(values: Floats, top: int) -> float:
-    """Offset from the sample `top` to the extremum of the parabola through it and its two neighbours. [samples]
+    """Offset from sample `top` to the vertex of the parabola through this sample and its neighbours. [samples]
 
     The result is 0 if the three samples are on a straight line.
     """
@@ -238,9 +239,9 @@ def _vertex(values: Floats, top: int) -> float:
 
 # ---------------------------------------------------------------------- an image read anywhere
 def between(values: Floats, row: Floats, column: Floats) -> Floats:
-    """Interpolate a table (nx, ny, k) linearly at n fractional rows and columns; the result is (n, k).
+    """Interpolate values on a grid (nx, ny, k) linearly at n fractional rows and columns. The result is (n, k).
 
-    Beyond the edges of the table, the values are extrapolated.
+    Beyond the edges of the grid, the values are extrapolated.
     """
     nx, ny = values.shape[:2]
     i = np.clip(np.floor(row).astype(np.int64), 0, nx - 2)
@@ -256,7 +257,7 @@ def between(values: Floats, row: Floats, column: Floats) -> Floats:
 def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
     """Fractional rows (n,) and columns (n,) of ground points (n, 2) in a grid of pixels (nx, ny, 2).
 
-    Both are NaN for points more than half a pixel outside the grid.
+    Both are NaN for points that are more than half a pixel outside the grid.
     """
     nx, ny = grid.shape[:2]
     middle = grid[nx // 2, ny // 2]
@@ -276,16 +277,16 @@ def places_in(grid: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 
 def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
-    """Interpolate an image at other ground points, such as those of a rotated grid.
+    """Interpolate an image at other ground points, such as the pixels of a rotated grid.
 
     Parameters
     ----------
     image : (nx, ny) ndarray
         Image at baseband, with at least three samples per resolution cell.
     grid : (nx, ny, 3) ndarray
-        Pixels of the image: east, north, up. [m]
+        East, north and up of the pixels of the image. [m]
     points : (mx, my, 3) ndarray
-        Points at which the image is read. [m]
+        East, north and up of the points at which the image is interpolated. [m]
 
     Returns
     -------
@@ -305,7 +306,7 @@ def resampled(image: Complexes, grid: Floats, points: Floats) -> Complexes:
 
 
 def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
-    """Interpolate an image by Lagrange polynomials at n scattered points, given by fractional row and column.
+    """Interpolate an image by Lagrange polynomials at n scattered points, given by fractional rows and columns.
 
     The image is treated as periodic.
     """
@@ -320,18 +321,20 @@ def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
 
 
 def _weights(positions: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
-    """Index of the first sample of the Lagrange stencil for each of `positions` (n,), and the Lagrange weights.
+    """First sample of the Lagrange stencil, and the Lagrange weights, for each of the `positions` (n,).
 
-    The indices are (n,). The list has an array of weights (n,) for each sample of the stencil.
+    The indices of the first samples are (n,). The list contains an array of weights (n,) for each sample of the
+    stencil.
     """
     first = np.floor(positions).astype(np.int64) - _TAPS_COUNT // 2 + 1
     return first, [lagrange_weight(positions - first, tap, _TAPS_COUNT) for tap in range(_TAPS_COUNT)]
 
 
 def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
-    """Lagrange weight of the sample with index `tap` in a stencil of `taps` samples, with the shape of `offset`.
+    """Lagrange weights of the sample with index `tap` in a stencil of `taps` samples.
 
-    `offset` contains the positions at which to interpolate, relative to the first sample of the stencil. [samples]
+    `offset` [samples] holds the positions at which to interpolate, relative to the first sample of the stencil. The
+    result has the shape of `offset`.
     """
     weight: Floats = np.ones(offset.shape)
     for node in range(taps):

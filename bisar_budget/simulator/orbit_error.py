@@ -1,7 +1,8 @@
 """Path error of a platform in free fall: the orbit from the measured state minus the orbit from the true state.
 
 Both orbits are integrated with the full gravity of a flattened Earth. The budget uses the linearised dynamics of
-`paths.free_fall` instead. The simulator does not use them, so that it checks the budget independently.
+`paths.free_fall` instead. The simulator does not use these dynamics, and is therefore an independent check of the
+budget.
 """
 
 from collections.abc import Sequence
@@ -25,15 +26,16 @@ def orbit_error(
     acceleration: Sequence[float],
     slow_time: Floats,
 ) -> Floats:
-    """Error of the measured path of a platform in free fall, from the errors of its state at mid-aperture.
+    """Path error of a platform in free fall (measured minus true), caused by errors of its state at mid-aperture.
 
     Parameters
     ----------
     state : PlatformState
-        The true path. Its attribute `fall`, the dynamics of its errors, must be set.
+        True path of the platform. Its attribute `fall`, the dynamics of its errors, must be set.
     position, velocity, acceleration : (3,)
-        Errors at mid-aperture: east, north, up. [m], [m/s], [m/s²] The velocity error is the rate of the position
-        error in Earth-fixed axes. The acceleration error is constant in Earth-fixed axes.
+        Errors of position [m], velocity [m/s] and acceleration [m/s²] at mid-aperture: east, north, up. The velocity
+        error is the rate of the position error in Earth-fixed axes. The acceleration error is constant in Earth-fixed
+        axes.
     slow_time : (times,)
         Slow times. [s]
 
@@ -60,7 +62,10 @@ def orbit_error(
     positions, velocities = (np.stack((state, state)) for state in ((r, wrong_r), (v, wrong_v)))
 
     def fallen(there: Floats, half_steps: int) -> Floats:
-        """Inertial acceleration on both orbits at the positions `there`, in axes fixed at mid-aperture."""
+        """Acceleration in the inertial axes of mid-aperture, for both orbits at the positions `there`. [m/s²]
+
+        `half_steps` is the time, counted in half integration steps from mid-aperture.
+        """
         pulled = _gravity(there, rotation)
         pulled[:, 1] += pushes[half_steps]
         return pulled
@@ -88,17 +93,17 @@ def orbit_error(
 
 @cache
 def _fit() -> Floats:
-    """Matrix that fits Legendre polynomials to values at the ends of all steps, (orders, ends)."""
+    """Matrix (orders, ends) that fits Legendre polynomials to values at the ends of all integration steps."""
     times = np.linspace(-1.0, 1.0, 2 * _STEP_COUNT + 1)
     return np.asarray(np.linalg.pinv(np.polynomial.legendre.legvander(times, _ORDER)))
 
 
 def _gravity(positions: Floats, rotation: Floats) -> Floats:
-    """Gravity at positions (..., 3) relative to the Earth's centre. [m/s²]
+    """Gravitational acceleration at positions (..., 3) relative to the Earth's centre. [m/s²]
 
-    The Earth's axis is along `rotation`, its rate of rotation. Gravity is the gradient of the potential
-    (μ/r)·[1 − J₂·(R/r)²·(3z²/r² − 1)/2], where z is the component along the axis and R the equatorial radius. Without
-    rotation the Earth is a sphere.
+    `rotation` is the angular velocity of the Earth and gives the direction of its axis. Gravity is the gradient of
+    the potential (μ/r)·[1 − J₂·(R/r)²·(3z²/r² − 1)/2], where z is the component of the position along the axis and R
+    is the equatorial radius. If `rotation` is zero, the Earth is a sphere.
     """
     distance = np.sqrt((positions * positions).sum(axis=-1, keepdims=True))
     pull = -EARTH_GRAVITATIONAL_PARAMETER_M3_PER_S2 / (distance * distance * distance)
@@ -114,7 +119,7 @@ def _gravity(positions: Floats, rotation: Floats) -> Floats:
 
 
 def _turned_by(rotation: Floats, times: Floats) -> Floats:
-    """Rotation matrices (times, 3, 3) for a rotation at the angular rate `rotation` [rad/s] during `times`. [s]"""
+    """Rotation matrices (times, 3, 3) for rotations over `times` [s] with the angular velocity `rotation`. [rad/s]"""
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
         return np.broadcast_to(np.eye(3), (times.size, 3, 3))

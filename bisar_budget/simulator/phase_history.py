@@ -1,7 +1,7 @@
-"""Bistatic phase history of point scatterers, (1) to (3) of Rigling & Moses, from exact ranges.
+"""Bistatic phase history of point scatterers, computed from exact ranges by (1) to (3) of Rigling & Moses.
 
-The simulator checks the series expansions of the budget, so it uses no Taylor series. Frame: scene centre at the
-origin, x east, y north, z up. SI units.
+The simulator is used to check the series expansions of the budget, so it uses no Taylor series itself. Frame: scene
+centre at the origin, x east, y north, z up. All quantities are in SI units.
 """
 
 import math
@@ -30,10 +30,10 @@ Complexes = NDArray[np.complex128]
 
 
 class PathSinusoid(NamedTuple):
-    """One sinusoidal vibration of a platform: zero-to-peak amplitude [m], frequency [Hz], and phase at τ = 0 [rad].
+    """A sinusoidal vibration of a platform: zero-to-peak amplitude [m], frequency [Hz], and phase at τ = 0 [rad].
 
-    The platform moves along `axis`, a unit vector. Without an axis it moves along the line of sight, which turns over
-    the aperture.
+    The platform moves along `axis`, a unit vector. If `axis` is None, it moves along the line of sight, which turns
+    over the aperture.
     """
 
     amplitude: float
@@ -43,7 +43,7 @@ class PathSinusoid(NamedTuple):
 
 
 class ReceiverNoise(TypedDict, total=False):
-    """Keyword arguments of `phase_history` for receiver noise: its power and the random generator."""
+    """Keyword arguments of `phase_history` for receiver noise: the noise power and the random generator."""
 
     noise_power: float
     rng: np.random.Generator | None
@@ -51,28 +51,28 @@ class ReceiverNoise(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Error as a function of slow time, given by samples with linear interpolation between them.
+    """Error as a function of slow time, defined by samples and linear interpolation between them.
 
-    `times` (n,) are the slow times of the samples. [s] `values` are (n,), or (n, 3) for vectors.
+    `times` (n,) [s] holds the slow times of the samples. `values` has the shape (n,), or (n, 3) for vectors.
     """
 
     times: Floats
     values: Floats
 
     def at(self, slow_time: Floats) -> Floats:
-        """Values at m slow times, by linear interpolation; (m,), or (m, 3) for vectors."""
+        """Linearly interpolated values at m slow times. The result has the shape (m,), or (m, 3) for vectors."""
         if self.values.ndim == 1:
             values: Floats = np.interp(slow_time, self.times, self.values)
             return values
         return np.stack([np.interp(slow_time, self.times, column) for column in self.values.T], axis=1)
 
     def plus(self, other: "Course") -> "Course":
-        """Sum of this error and another, sampled at the times of both."""
+        """Sum of this error and another, sampled at the union of their sample times."""
         times = np.union1d(self.times, other.times)
         return Course(times, self.at(times) + other.at(times))
 
     def smooth(self, order: int = SMOOTH_ORDER) -> "Course":
-        """Polynomial fitted to the values: the slow part of the error, which displaces and defocuses a response."""
+        """Slow part of the error, which displaces and defocuses a response: a polynomial fitted to the values."""
         scaled_time = 2 * (self.times - self.times[0]) / (self.times[-1] - self.times[0]) - 1
         fit = np.polynomial.legendre.legfit(scaled_time, self.values, order)
         return Course(self.times, np.polynomial.legendre.legval(scaled_time, fit).T)
@@ -85,17 +85,18 @@ class Course:
 
 
 class PathError(NamedTuple):
-    """Measured minus actual position of one platform, r̃(τ): the polynomial (22) and faster errors.
+    """Measured minus actual position of one platform, r̃(τ): a polynomial, and faster errors.
 
-    Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], an error of any form over time, are in
-    east-north-up. Noise, and vibrations without an axis, are along the line of sight, positive away from the scene.
-    The errors of position, velocity and acceleration apply at mid-aperture. For a platform in free fall, they are the
-    initial errors of the measured orbit. For any other platform, they are the coefficients of a polynomial of time.
-    `height` [m] is the error of the assumed scene height, positive if the scene is assumed too high. It moves the
-    measured path up, and does not change an orbit.
-    `time_tag` [s] is the delay of the time tags: the measured position at a time τ is the true position at τ plus the
-    delay. `wideband_rms` [m] is the RMS position noise of the pulses, white or within `wideband_band` (low, high)
-    [Hz]. It requires a random generator.
+    The polynomial is equation (22) of Rigling & Moses. Its errors of position [m], velocity [m/s] and acceleration
+    [m/s²] are in east-north-up. So is `course` [m], an error with an arbitrary time history. Noise, and vibrations
+    for which no axis is given, are along the line of sight, positive away from the scene. The errors of position,
+    velocity and acceleration apply at mid-aperture. For a platform in free fall, they are the initial errors of the
+    measured orbit. For any other platform, they are the coefficients of a polynomial of time. `height` [m] is the
+    error of the assumed scene height, positive if the scene is assumed too high. A height error raises the measured
+    path of a platform; the path of a platform in orbit is not affected. `time_tag` [s] is the delay of the time tags:
+    the measured position at a time τ is the true position at τ plus the delay. `wideband_rms` [m] is the rms position
+    noise of the pulses, which is white, or limited to the band `wideband_band` (low, high) [Hz]. Simulating it
+    requires a random generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -109,9 +110,9 @@ class PathError(NamedTuple):
     height: float = 0.0
 
     def slow(self) -> "PathError":
-        """Return the same error with `course` replaced by its smooth part, a polynomial of slow time.
+        """Return the same error with `course` replaced by its slow part, a polynomial of slow time.
 
-        Vibration is not changed.
+        Vibration is unchanged.
         """
         return self if self.course is None else self._replace(course=self.course.smooth())
 
@@ -120,7 +121,7 @@ class PathError(NamedTuple):
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Sum of this error and another, without the vibration of either."""
+        """Sum of this error and another. Vibration is left out."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
@@ -130,11 +131,12 @@ class PathError(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors in one image: of both platforms, of the clock, and of the atmosphere.
+    """Errors that affect one image: path errors of both platforms, clock errors, and delays in the atmosphere.
 
-    `clock` are the coefficients t̃₀ … t̃₃ of (1), in s, 1, 1/s and 1/s². `clock_course` [s] is a clock error of any
-    form over time; it includes delays in the atmosphere that do not depend on frequency. `electrons` [s·Hz²] is the
-    delay by free electrons at a frequency f of 1 Hz. This delay is proportional to 1/f², and advances the phase.
+    `clock` holds the clock error coefficients t̃₀ … t̃₃ of equation (1), in s, 1, 1/s and 1/s². `clock_course` [s] is
+    a clock error with an arbitrary time history; it includes delays in the atmosphere that do not depend on
+    frequency. `electrons` [s·Hz²] is the delay due to free electrons at a frequency of 1 Hz; at a frequency f, the
+    delay is `electrons`/f². Free electrons delay the signal, but advance its phase.
     """
 
     transmitter: PathError = PathError()
@@ -144,11 +146,14 @@ class Errors(NamedTuple):
     electrons: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
-        """Return the same errors, with the path error of `platform`, "transmitter" or "receiver", replaced."""
+        """Return the same errors with the path error of `platform` replaced by `error`.
+
+        `platform` is "transmitter" or "receiver".
+        """
         return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
 
     def smooth(self) -> "Errors":
-        """Return the same errors without vibration, and with each `Course` replaced by its smooth part."""
+        """Return the same errors without vibration, and with each `Course` replaced by its slow part."""
         return self.slow().still()
 
     def still(self) -> "Errors":
@@ -156,7 +161,7 @@ class Errors(NamedTuple):
         return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
 
     def slow(self) -> "Errors":
-        """Return the same errors with each `Course` replaced by its smooth part; vibration is not changed.
+        """Return the same errors with each `Course` replaced by its slow part. Vibration is unchanged.
 
         Fast noise would distort a phase that is computed from only a few slow times.
         """
@@ -169,7 +174,7 @@ class Errors(NamedTuple):
 
 
 def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
-    """Sum of several sets of errors in one image, without vibration."""
+    """Sum of several sets of errors of the same image. Vibration is left out."""
     total = Errors()
     for errors in errors_of_sources:
         total = Errors(
@@ -183,30 +188,30 @@ def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
 
 
 def _sum(course: Course | None, other: Course | None) -> Course | None:
-    """Sum of two errors over time; None counts as zero, and the sum is None if both are None."""
+    """Sum of two errors over time. None counts as zero; the sum is None if both are None."""
     return course.plus(other) if course is not None and other is not None else course or other
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Path:
-    """Actual and measured positions of a platform at each pulse, (pulses, 3) each. [m]"""
+    """Actual and measured positions of a platform at each pulse; both are (pulses, 3). [m]"""
 
     actual: Floats
     measured: Floats
 
     def seen_from(self, ground_point: GroundVector) -> "Path":
-        """Return the same path with positions relative to a ground point."""
+        """Return the same path with positions relative to a ground point, east and north. [m]"""
         offset = np.array([*ground_point, 0.0])
         return Path(actual=self.actual - offset, measured=self.measured - offset)
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Paths of both platforms at given slow times, with clock errors and delays at these times, (times,) each.
+    """Paths of both platforms at given slow times, and the clock error and delay at these times.
 
-    `clock` is the clock error. [s] `electrons` is the delay by free electrons at a frequency of 1 Hz, or None if
-    there is no such delay. [s·Hz²] `seen` is the equivalent clock error, which has the same effect on an image
-    as `clock` and the electrons together. [s]
+    `clock` [s] is the clock error. `electrons` [s·Hz²] is the delay due to free electrons at a frequency of 1 Hz, or
+    None if there is no such delay. `seen` [s] is the equivalent clock error, which has the same effect on an image as
+    `clock` and the electrons together. All arrays have the shape (times,).
     """
 
     transmitter: Path
@@ -226,7 +231,7 @@ class Flight:
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
     def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-        """Recorded range sum of `scatterer` minus the range sum of `seen_at` for the measured paths, (times,). [m]
+        """Recorded range sum of `scatterer` minus the range sum of `seen_at` from the measured paths, (times,). [m]
 
         Both are ground points. The recorded range sum includes the clock error `seen`.
         """
@@ -246,9 +251,9 @@ class Flight:
         frequency: Floats,
         **noise: Unpack[ReceiverNoise],
     ) -> "PhaseHistory":
-        """Record the phase history of scatterers with the paths and clock errors of this flight.
+        """Record the phase history of scatterers with the paths, clock error and delays of this flight.
 
-        The arguments are those of `phase_history`. `slow_time` must be the slow times of the flight.
+        The arguments are the same as for `phase_history`. `slow_time` must hold the slow times of the flight.
         """
         return phase_history(
             scatterers,
@@ -265,11 +270,11 @@ class Flight:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseHistory:
-    """Received samples after motion compensation to the scene centre, with the measured paths.
+    """Received samples after motion compensation to the scene centre, and the measured paths.
 
-    `samples` is (pulses, frequencies). `slow_time` [s] is the time of each pulse, and `frequency` [Hz] the frequency
-    of each sample. Backprojection and the polar format need evenly spaced frequencies. `transmitter` and `receiver`
-    are the measured positions, (pulses, 3). [m]
+    `samples` is (pulses, frequencies). `slow_time` [s] is the time of each pulse, and `frequency` [Hz] is the
+    frequency of each sample. Backprojection and the polar format need evenly spaced frequencies. `transmitter` and
+    `receiver` are the measured positions, (pulses, 3). [m]
     """
 
     samples: Complexes
@@ -280,7 +285,7 @@ class PhaseHistory:
 
 
 def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
-    """Sum of the unit vectors from the scene centre to both platforms, as in (6), (pulses, 3)."""
+    """Sum of the unit vectors from the scene centre to both platforms, as in equation (6), with shape (pulses, 3)."""
     total: Floats = np.zeros(transmitter.shape)
     for positions in (transmitter, receiver):
         total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
@@ -288,7 +293,7 @@ def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
 
 
 def cell_centres(length: float, count: int) -> Floats:
-    """Centres of `count` equal cells that divide an interval of a given length, centred at zero, (count,)."""
+    """Centres (count,) of `count` equal cells that divide an interval of a given length, centred at zero."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)
     return centres
 
@@ -304,12 +309,11 @@ def is_even(frequency: Floats) -> bool:
 
 
 def split(wavenumber: Floats) -> tuple[Floats, Floats]:
-    """Split evenly spaced wavenumbers into coarse and fine wavenumbers whose sums are the given wavenumbers.
+    """Find coarse and fine wavenumbers whose sums are the given, evenly spaced wavenumbers.
 
-    A table of these sums, with a row for each coarse wavenumber, contains the given wavenumbers in order. The last
-    row may extend beyond the given wavenumbers. The phasor of a sum is a product of two phasors, so n wavenumbers
-    need
-    only about 2√n exponentials.
+    In a table of all sums, with a row for each coarse wavenumber, the given wavenumbers appear in order; the last row
+    may extend beyond them. The phasor of a sum is the product of two phasors, so n wavenumbers need only about 2√n
+    exponentials.
     """
     fine = math.isqrt(wavenumber.size - 1) + 1
     coarse = -(-wavenumber.size // fine)
@@ -329,21 +333,27 @@ def path(
     Parameters
     ----------
     state : PlatformState
-        State of the platform at τ = 0, which gives its true path.
+        State of the platform at τ = 0, which determines its true path.
     slow_time : (pulses,) ndarray
         Slow times of the pulses. [s]
     error : PathError, optional
-        Error of the measured path. None means no error.
+        Error of the measured path. None means that the path is measured without error.
     rng : numpy Generator, optional
-        Random generator, required for wideband vibration only.
+        Random generator. It is required only for wideband vibration.
     way : (pulses, 3) ndarray, optional
-        Displacement vector per metre of noise and of vibrations without an axis. [m/m] None means the unit vector
-        along the line of sight.
+        Displacement vector for each metre of noise, and of vibrations for which no axis is given [m/m]. If it is
+        None, the unit vector along the line of sight is used.
+
+    Returns
+    -------
+    Path
+        Actual and measured positions.
 
     Raises
     ------
     ValueError
-        Wideband vibration without a generator, or in a band that contains no frequency that the pulses can sample.
+        The error contains wideband vibration, but there is no generator, or the pulses cannot sample any frequency of
+        its band.
     """
     actual = _placed(state, slow_time)
     if error is None:
@@ -376,15 +386,15 @@ def path(
 
 
 def _placed(state: PlatformState, slow_time: Floats) -> Floats:
-    """Positions of a platform on its path at given slow times, (times, 3). [m]"""
+    """Positions (times, 3) of a platform on its path at given slow times. [m]"""
     return np.stack(np.broadcast_arrays(*state.place(slow_time)), axis=1)
 
 
 def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:
     """Gaussian noise of variance 1 at the slow times of the pulses, (pulses,).
 
-    It is white if `band` is None, and otherwise within the band (low, high). [Hz] A `ValueError` is raised if the
-    band contains no frequency that the pulses can sample.
+    The noise is white if `band` is None, and otherwise limited to the band (low, high) [Hz]. A `ValueError` is raised
+    if the pulses cannot sample any frequency of the band.
     """
     white: Floats = rng.normal(0.0, 1.0, slow_time.shape)
     if band is None:
@@ -409,11 +419,11 @@ def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.G
 def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Floats, Floats]:
     """Shortest displacement of each platform that changes the excess range by one metre. [m/m]
 
-    The excess range is the bistatic range minus the baseline, which is the length of the direct path. Both results
-    are (pulses, 3), the transmitter first. The displacement of the transmitter is along u_t − b, and that of the
-    receiver along u_r + b. Here u_t and u_r are the
-    unit vectors from the scene centre to the platforms, and b is the unit vector from receiver to transmitter. The
-    displacement is zero for a platform whose motion cannot change the bistatic range minus the baseline.
+    The excess range is the bistatic range minus the baseline, which is the length of the direct path. There are two
+    results, for transmitter and receiver, (pulses, 3) each. The displacement is along u_t − b for the transmitter,
+    and along u_r + b for the receiver. Here u_t and u_r are the unit vectors from the scene centre to the platforms,
+    and b is the unit vector from receiver to transmitter. The displacement is zero for a platform whose motion cannot
+    change the excess range.
     """
     platforms = (
         PlatformState(position=platform.place(slow_time), velocity=platform.velocity) for platform in geometry.both
@@ -431,9 +441,9 @@ def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Flo
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
     """Clock error of a receiver that uses the direct signal of the transmitter as its clock, (pulses,). [s]
 
-    It is the measured minus the actual distance between the platforms, divided by c. The receiver measures the delay
-    of an echo after the direct signal, which itself arrives late by the actual distance divided by c. The processor
-    corrects for the measured distance.
+    The receiver measures the delay of an echo relative to the direct signal, which arrives late by the actual
+    distance between the platforms divided by c. The processor corrects for this delay with the measured distance. The
+    clock error is therefore the measured minus the actual distance, divided by c.
     """
     transmitter, receiver = paths
     excess_range: Floats = np.linalg.norm(transmitter.measured - receiver.measured, axis=-1) - np.linalg.norm(
@@ -455,28 +465,28 @@ def phase_history(
     noise_power: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> PhaseHistory:
-    """Simulate the samples that the receiver records, with motion compensation by the measured positions.
+    """Simulate the samples that the receiver records, after motion compensation with the measured positions.
 
     Parameters
     ----------
     scatterers : (scatterers, 3) ndarray
-        Positions. [m]
+        Positions of the scatterers. [m]
     amplitudes : (scatterers,) ndarray
-        Complex reflection coefficients A_m of (3).
+        Complex reflection coefficients A_m of equation (3).
     slow_time : (pulses,) ndarray
-        Slow times. [s]
+        Slow times of the pulses. [s]
     frequency : (frequencies,) ndarray
         Frequencies of the samples. [Hz]
     transmitter, receiver : Path
-        Paths at the pulses.
+        Actual and measured positions at the pulses.
     clock_error : (pulses,) ndarray or float
-        t̃(τ) of (1). [s]
+        Clock error t̃(τ) of equation (1). [s]
     electrons : (pulses,) ndarray, optional
-        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer. [s·Hz²] None means no delay.
+        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer [s·Hz²]. None means no delay.
     noise_power : float
-        Variance of the circular white Gaussian noise of a sample, relative to amplitude 1.
+        Variance of the circular white Gaussian noise of a sample. A scatterer of amplitude 1 has a power of 1.
     rng : numpy Generator, optional
-        Random generator, required for noise only.
+        Random generator. It is required only for noise.
 
     Returns
     -------
@@ -485,7 +495,7 @@ def phase_history(
     Raises
     ------
     ValueError
-        Noise without a generator, or a number of amplitudes that differs from the number of scatterers.
+        There is noise but no generator, or the number of amplitudes is not the number of scatterers.
     """
     wavenumber = 2 * math.pi * frequency / SPEED_OF_LIGHT_MPS
     reference = np.linalg.norm(transmitter.measured, axis=1) + np.linalg.norm(receiver.measured, axis=1)
@@ -529,7 +539,7 @@ def phase_history(
 
 # ---------------------------------------------------------------------- by exact ranges
 class NoGroundPointError(ValueError):
-    """No ground point has the recorded range history, so the point has no image."""
+    """No ground point has the recorded range history, so the target does not appear in the image."""
 
 
 def exact_effect(
@@ -542,8 +552,8 @@ def exact_effect(
 ) -> ExactEffect:
     """Compute from exact ranges the displacement and the remaining phases that path and clock errors cause.
 
-    The target is at the origin of the paths. `slow_time` [s] may be unevenly spaced, and its middle element must be
-    mid-aperture. The method of solution is described in `ranges.exact_ranges`.
+    The target is at the origin of the frame of the paths. `slow_time` [s] may be unevenly spaced, but its middle
+    element must be mid-aperture. The method is described in `ranges.exact_ranges`.
 
     Raises
     ------
@@ -569,15 +579,15 @@ def exact_effect(
 
 
 def _columns(positions: Floats) -> VectorArrays:
-    """Components x, y and z of positions (..., 3), as three arrays of shape (..., 1)."""
+    """Components x, y and z of positions (..., 3), as three arrays with a last axis of length 1."""
     x, y, z = np.moveaxis(positions, -1, 0)[..., None]
     return x, y, z
 
 
 def _sampling(nodes: Floats) -> Sampling:
-    """Sampling of range histories at any slow times `nodes` (samples,), in units of half the aperture time.
+    """Sampling of range histories at arbitrary slow times `nodes` (samples,), in units of half the aperture time.
 
-    The weights that give the Legendre parts of a history come from a polynomial fitted to its samples.
+    The weights that give the Legendre components of a history result from a polynomial fit to its samples.
     """
     legendre = np.polynomial.legendre.legvander(nodes, min(_FIT_ORDER, max(3, nodes.size // 4)))
     return Sampling(nodes, LEGENDRE_LEADING[:, None] * np.linalg.pinv(legendre)[:4])

@@ -72,18 +72,18 @@ A_POINT = Targets()  # at the scene centre
 
 
 class SimulationError(Exception):
-    """The images cannot be formed as requested. The message says what the user should change."""
+    """The images cannot be formed as requested. The message states how the user can change the request."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
     """Position of one target in the images, and the measured width, peak and sidelobes of its response.
 
-    `effect` is the effect of the errors, computed from exact ranges, with the displacement relative to the target.
-    The image former shows the target at `shown` in the rotated images, and at `shown_in_scene` in the image along
-    (x, y); both are east and north. [m] `clean`, `smeared` and `focused` are measures of the cross-range cuts through
-    the target in the image without errors, the image with errors and the image after autofocus. A measure is None if
-    the response cannot be measured, for example because a neighbouring target covers it.
+    `effect` is the effect of the errors, computed from exact ranges; its displacement is relative to the target. The
+    target appears at the ground point `shown` [m] in the rotated images, and at `shown_in_scene` [m] in the image
+    along (x, y); both are east and north. `clean`, `smeared` and `focused` are measures of the cross-range cuts
+    through the target in the image without errors, the image with errors and the image after autofocus. A measure is
+    None if the response cannot be measured, for example because a neighbouring target covers it.
     """
 
     target: Target
@@ -96,25 +96,27 @@ class Response:
 
 
 class PointImages(NamedTuple):
-    """Images of point scatterers, by default a single point at the scene centre, with quantities that explain them.
+    """Images of point scatterers, by default of a single one at the scene centre, and quantities that explain them.
 
     All points are in the axes of the scene, east and north of its centre. [m]
 
     Images are complex, and cover the ground around the displaced targets. `in_scene` is on `scene_grid`, (nx, ny, 3),
     along (x, y), and shows as much of the patch as fits into a quarter of a million pixels. `rotated`, `focused` and
     `error_free` are on `grid`, (nx, ny, 3), along (x′, y′). This grid follows lines of equal range if the image
-    former uses exact ranges, and the axes of (10) if it uses plane waves. `scene_spacing` and `spacing`, (2,), are
-    the distances of neighbouring pixels. [m]
+    former uses exact ranges, and the axes of equation (10) if it uses plane waves. `scene_spacing` and `spacing`,
+    (2,), are the distances between neighbouring pixels of these grids. [m]
 
     `effect` and `range_error` are for a point at the scene centre. `range_error` is the range error over `slow_time`
-    without its constant and linear part. `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`.
-    `points` (3, 2) are the ground points (29) for the three pieces of the full range error, computed with the
-    gradients that `points_by` names. By (25), the scene centre appears at the second of these points.
+    without its constant and linear part. `segments` (3, 2) holds its value [m] and slope [m/s] at the three
+    `segment_times`. `points` (3, 2) holds the ground points that equation (29) gives for these three segments of the
+    full range error, computed with the gradients named by `points_by`. By equation (25), the scene centre appears at
+    the second of these points.
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
-    the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` is the error of
-    the measured peak of a single point without errors. [dB] It is above 0 if the pixels do not sample the response
-    well enough, and NaN if it is unknown. `outside` names the declared paired echoes that are beyond the patch.
+    the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` [dB] is the
+    error of the measured peak of a single point without errors. It is above 0 if the pixels do not sample the
+    response well enough, and NaN if it is unknown. `outside` names the declared paired echoes that are beyond the
+    patch.
     """
 
     slow_time: Floats
@@ -164,12 +166,12 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Patch sizes, numbers of samples and memory that a mission's images need, chosen before an image is formed.
+    """Patch sizes, numbers of samples and memory for the images of a mission, chosen before an image is formed.
 
-    `rotated` is the patch of the images along (x′, y′), and `in_scene` that of the image along (x, y). A range cell
-    has `finer` times as many pixels as a cross-range cell. The response of a target, with its margin, is `own_cells`
-    resolution cells wide in cross-range. `outside` names the paired echoes that are beyond the patch, or is empty.
-    `bytes_held` is the memory of the image formers besides images and phase history. [B]
+    `rotated` is the patch of the images along (x′, y′), and `in_scene` is the patch of the image along (x, y). A
+    range cell has `finer` times as many pixels as a cross-range cell. The response of a target, including its margin,
+    is `own_cells` resolution cells wide in cross-range. `outside` names the paired echoes that are beyond the patch,
+    or is empty. `bytes_held` is the memory that the image formers need besides images and phase history. [B]
     """
 
     rotated: Patch
@@ -196,7 +198,7 @@ class Plan:
         """Raise a `SimulationError` if the plan needs more memory than a limit. [B]
 
         The message also proposes fewer pulses if `given_pulses`, the number in the mission file, is larger than
-        necessary. None means that the file gives no number.
+        necessary. `given_pulses` is None if the file gives no number.
         """
         if self.memory > limit:
             x, y = self.rotated.shape
@@ -217,15 +219,14 @@ def simulate_point(
     targets: Targets = A_POINT,
     foreseen: Callable[[float], None] | None = None,
 ) -> PointImages:
-    """Form images of points with the declared errors, before and after autofocus.
+    """Form images of point targets with the declared errors, before and after autofocus.
 
     Errors have the signs and the coverage factor of the mission file. A covariance has no sign. It is represented by
     the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor. Vibration along
-    the line of sight is part of the data. Wideband vibration is drawn with the seed of the file. The patch is around
-    the displaced points, along the lines of equal range of the measured paths, and long enough for the smear and the
-    paired echoes. The
-    error-free image is formed by the same processor. Its data are those of points at the displaced positions,
-    recorded as if the platforms flew the measured paths.
+    the line of sight is part of the data. Wideband vibration is drawn with the seed of the file. The patch contains
+    the displaced points, and follows the lines of equal range of the measured paths. It is long enough for the smear
+    and the paired echoes. The error-free image is formed by the same processor from error-free data: the targets are
+    at the displaced points, and the platforms fly along the measured paths.
 
     Parameters
     ----------
@@ -235,21 +236,23 @@ def simulate_point(
         Called during image formation with the finished work and the total work, both as pixels times pulses.
     image_former : str
         One of `IMAGE_FORMERS`. The polar format forms only the rotated images; the image along (x, y) is then formed
-        by backprojection. In the paper, too, Figure 5 is formed by (4) and Figure 6 by (14).
+        by backprojection. In the same way, Figure 5 of the paper is formed by equation (4), and Figure 6 by equation
+        (14).
     targets : Targets
-        Points and clutter of the scene. Clutter is one random scatterer for each resolution cell of the patch.
+        Point targets and clutter of the scene. Clutter consists of a random scatterer for each resolution cell of the
+        patch.
     foreseen : callable, optional
-        Called before the images are formed, with the time that this will take [s]. The time is estimated from a trial
-        with a few pulses and pixels. Without it there is no trial.
+        Called before the images are formed, with the estimated time [s] for this. The estimate is made from a trial
+        with a few pulses and pixels, which is omitted if `foreseen` is None.
 
     Raises
     ------
     SimulationError
         No ground point has the recorded range history; the pulses are too few for the patch; images and phase history
-        need more memory than `simulation.memory_limit`; or the image former cannot process the collection. These are
-        checked before an image is formed.
+        need more memory than `simulation.memory_limit`; or the image former cannot process the collection. All this
+        is checked before an image is formed.
     ValueError
-        An unknown image former.
+        The image former is unknown.
     """
     if image_former not in IMAGE_FORMERS:
         raise ValueError(f"image former {image_former!r}; known: {', '.join(IMAGE_FORMERS)}")
@@ -297,7 +300,7 @@ def simulate_point(
         return by.image(data, grid, on_pixels)
 
     def seconds() -> float:
-        """Estimate the time to record and to form all images. [s]"""
+        """Estimate the time to record the phase histories and to form all images. [s]"""
         start_time, trial_times = time.perf_counter(), cell_centres(T, _TRIAL_PULSES)
         trial_flight = collection.flight(slow, trial_times)
         scatterer_places = np.pad(np.concatenate((target_points, clutter)), ((0, 0), (0, 1)))
@@ -396,10 +399,10 @@ def simulate_point(
 
 
 def declared_errors(mission: Mission) -> Errors:
-    """Declared errors of a mission in one flight, with the signs, the seed and the coverage factor of its file.
+    """Declared errors of a mission as they occur together in one flight.
 
-    A covariance has no sign. It is represented by the most probable error with a quadratic phase of one sigma,
-    multiplied by the coverage factor.
+    They have the signs, the seed and the coverage factor of the mission file. A covariance has no sign. It is
+    represented by the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor.
     """
     analysis = Analysis(mission)
     sizes = {source.id: source.declared for source in analysis.stated if source.displaces}
@@ -422,7 +425,7 @@ def declared_errors(mission: Mission) -> Errors:
 
 
 def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
-    """Add motions and phases to errors, so that they also have the effects that `other_errors` states.
+    """Add to `errors` motions and clock errors with the effects that the mission file states in `other_errors`.
 
     A quadratic and a cubic phase are added as a clock error over slow time. A displacement moves both measured paths
     to the east, which moves the image to the east by the same distance. A stated ISLR becomes white noise of the
@@ -454,7 +457,7 @@ def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
 def _formers(
     collection: PointCollection, image_former: str, lines: RangeLines, flight: Flight
 ) -> tuple[Former, Former]:
-    """Image formers for the rotated images, and for the image along (x, y), in this order.
+    """Return the image former for the rotated images, and the image former for the image along (x, y).
 
     They are the same, except that the polar format is combined with backprojection for the image along (x, y).
     """
@@ -468,7 +471,7 @@ def _formers(
 
 
 def _middle(points: Sequence[GroundVector] | Floats) -> GroundVector:
-    """Centre of the smallest box around ground points, used as the centre of a patch. [m]"""
+    """Centre of the smallest box that contains the given ground points, used as the centre of a patch. [m]"""
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     return float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2
 
@@ -482,12 +485,12 @@ def _plan(
     remaining_range: Floats,
     slope: Floats,
 ) -> Plan:
-    """Choose the smallest patches and numbers of samples with which the images contain the responses.
+    """Choose the smallest patches and numbers of samples for which the images contain the responses.
 
-    The sizes follow from the remaining range error [m] and its slope [m/s] over slow time. `shown` and `scene_shown`
-    (targets, 2) are the ground points at which both image formers show the targets. [m] Along lines of equal range
-    and of equal Doppler, the band of a response is a rectangle and its smear is along y′. In the image along (x, y)
-    both are rotated.
+    The sizes follow from the remaining range error [m] and its slope [m/s] over slow time. `shown` and `scene_shown`,
+    (targets, 2) [m], are the ground points at which the two image formers show the targets. On a grid along lines of
+    equal range and of equal Doppler, the band of a response is a rectangle and its smear is along y′. In the image
+    along (x, y) both are rotated.
     """
     T, radar = mission.collection.aperture_time, mission.radar
     centre, scene_centre = _middle(shown), _middle(scene_shown)
@@ -549,16 +552,16 @@ def _plan(
 
 
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
-    """Sinusoidal motions of both platforms: declared vibrations, and motions equivalent to oscillator phases.
+    """Sinusoidal motions of both platforms: declared vibrations, and motions that represent oscillator phases.
 
-    An equivalent motion causes the same phase as an oscillator that vibrates with its platform. Motions with an
-    amplitude of 0 are omitted.
+    The latter cause the same phase as an oscillator that vibrates with its platform. Motions with an amplitude of 0
+    are omitted.
     """
     return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
 
 
 def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Sinusoidal motions of one platform: declared vibrations, and motions equivalent to its oscillator's phases."""
+    """Sinusoidal motions of one platform: declared vibrations, and motions that represent its oscillator's phases."""
     count = len(getattr(mission.platforms, name).motion_error.vibration.sinusoidal)
     declared_lines = (line for entry in range(count) for line in sinusoids_of(mission, name, entry))
     return (*declared_lines, *oscillator_sinusoids(mission, name))
@@ -584,9 +587,9 @@ def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
 
 
 def pulses_for(mission: Mission, cells: int) -> int:
-    """Number of pulses with which the patch and every declared vibration are sampled without aliasing.
+    """Number of pulses with which the patch and all declared vibrations are sampled without aliasing.
 
-    It is `collection.pulses` if the mission file declares it. Otherwise it is a power of two, with at least two
+    This is `collection.pulses` if the mission file declares it. Otherwise it is a power of two, with at least two
     pulses per resolution cell and four per cycle of vibration. A `SimulationError` is raised if the declared number
     is too small, or if the necessary number is too large.
     """
@@ -614,10 +617,10 @@ def pulses_for(mission: Mission, cells: int) -> int:
 
 
 def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure the impulse response of a cross-range cut, with its peak shifted cyclically to the middle.
+    """Measure the impulse response along a cross-range cut, after shifting its peak cyclically to the middle.
 
-    If a smear covers most of the patch, its peak may be near an end of the cut, and the shift wraps the smear around.
-    If the measurement then fails, it is repeated with zeros appended that double the length of the cut.
+    If a smear covers most of the patch, the peak may be near an end of the cut, and the shift wraps the smear around.
+    If the measurement then fails, it is repeated with a cut that is padded with zeros to twice its length.
     """
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
@@ -633,8 +636,8 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
     There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
     so `level_db` is the mean power of a pixel. Both results are empty if `level_db` is None. A range cell has `finer`
     times as many pixels as a cross-range cell. If `finer` is above 1, scatterers up to a range cell beyond the patch
-    are included, because their responses extend into it. They are out of focus. Their blur in cross-range increases
-    by several cells with each line of distance from the patch.
+    are included, because their responses extend into it. These scatterers are out of focus; with each line of
+    distance from the patch, their blur in cross-range increases by several cells.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
@@ -654,9 +657,9 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
 def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
     """Window (rows, columns) around the target with the given index in the rotated patch.
 
-    `cells` (targets, 2) are the positions of the targets in resolution cells from the middle of the patch. A single
-    target gets the whole patch. Among several targets, the window ends halfway to the nearest target of a similar
-    range, but it has at least a minimum width.
+    `cells` (targets, 2) holds the positions of the targets, in resolution cells from the middle of the patch. A
+    single target gets the whole patch. Among several targets, the window ends halfway to the nearest target of a
+    similar range, but it has at least a minimum width.
     """
     distances = np.abs(cells - cells[index])
     neighbours = distances[(distances[:, 0] < 2 * _SEPARATE_RANGE_CELLS) & (distances[:, 1] > 0), 1]
@@ -674,7 +677,7 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
 def _cuts(
     images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
 ) -> list[ImpulseResponse | None]:
-    """Measure a target in each image, with the mainlobe mask of the first image, which has no errors.
+    """Measure the response of a target in each image. The first image has no errors and sets the mainlobe mask.
 
     The entry is None for an image in which the target cannot be measured. All entries are None if the peak in the
     first image is not above half of `amplitude`, because the patch then does not contain the target.

@@ -1,8 +1,9 @@
 """Random time series of sensor, clock and atmosphere errors within one aperture.
 
-The time series check the formulas of the budget, so they do not use these formulas. Random walks are sums of steps.
-Correlated noise is computed by its recursion. Phase noise is a sum of tones. Synchronisation by pulse exchanges
-subtracts straight lines between the values of the phase noise at the exchanges.
+The time series are used to check the formulas of the budget, so they are computed without these formulas. Random
+walks are sums of steps. Correlated noise is computed by recursion over time. Phase noise is a sum of tones. To
+simulate synchronisation by pulse exchanges, straight lines between the values of the phase noise at the exchanges are
+subtracted.
 """
 
 import math
@@ -64,12 +65,13 @@ _MAX_FLOWN_STEPS = 1 << 19  # of phase noise; beyond, fast tones are interpolate
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Draw the position errors that a random error causes, for one sigma of the declared size.
+    """Draw the position errors of the platforms due to a random error, for one sigma of its declared size.
 
-    The error is that of an inertial sensor or of a lever arm, or correlated position noise. The keys of the result
-    are the names of the platforms. The values are (draws, times, 3): east, north, up. [m] If the error is common to
-    both platforms, both use the same random numbers along their axes. `error.declared` only scales the result.
-    The ratios between the axes are those of the mission. `times` (times,) are slow times within the aperture. [s]
+    The error is an error of an inertial sensor or of a lever arm, or correlated position noise. The keys of the
+    result are the names of the platforms. The values [m] are (draws, times, 3): east, north, up. If the error is
+    common to both platforms, both use the same random numbers along their axes. `error.declared` only scales the
+    result; the ratios between the axes are taken from the mission. `times` (times,) are slow times within the
+    aperture. [s]
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     courses = {}
@@ -88,9 +90,10 @@ _Motions = list[tuple[Floats, Floats]]
 def _drawn_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the motion of each platform as random series with directions, by name of the platform.
+    """Draw the motion of each platform due to a random error.
 
-    The largest component of the error is 1.
+    The largest component of the error has a standard deviation of 1. The result maps the name of each platform to
+    pairs of a random time series and the motion per unit of the series.
     """
     return error.kind.find_in(_MOTION_DRAWS, error.subject.axis)(mission, error, times, draws, rng)
 
@@ -98,9 +101,10 @@ def _drawn_motions(
 def _noise_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the motion due to correlated position noise, by name of the platform, with a largest component of 1.
+    """Draw the motion of each platform due to correlated position noise.
 
-    Platforms that share the noise get the same series.
+    The largest component of the noise has a standard deviation of 1. Platforms that share the noise get the same time
+    series. The keys of the result are the names of the platforms.
     """
     process = process_of(mission, error)
     _, sizes = parts_of_largest(np.array(process.sigma))
@@ -116,10 +120,11 @@ def _noise_motions(
 def _sensor_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the motion that an error of an inertial sensor causes, with a largest component of 1.
+    """Draw the motion of a platform due to an error of its inertial sensor.
 
-    The motion follows from the acceleration error. If the sensor error tilts the platform and the mission file states
-    a lever arm, the swing of the lever arm is added.
+    The largest component of the error has a standard deviation of 1. The motion follows from the acceleration error.
+    If the sensor error tilts the platform and the mission file states a lever arm, the motion of the antenna due to
+    the tilt of the lever arm is added.
     """
     figure, motion = INERTIAL_FIGURES[error.subject.axis], _motion(mission, error.owner)
     state: PlatformState = getattr(mission.platforms, error.owner).state
@@ -140,8 +145,8 @@ def _swing_motions(
 ) -> dict[str, _Motions]:
     """Draw the antenna motion that an attitude error causes through the lever arm.
 
-    The largest component of the attitude error has a standard deviation of 1 rad. The acceleration error due to the
-    tilt is not included.
+    The largest component of the attitude error has a standard deviation of 1 rad. The acceleration error that results
+    from the tilt is not included.
     """
     motion, swings = _motion(mission, error.owner), _swings(mission, error.owner, times)
     assert swings is not None
@@ -152,9 +157,9 @@ def _swing_motions(
 def _arm_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the motion that an error of the lever arm itself causes, with a largest component of 1.
+    """Draw the motion due to an error of the lever arm.
 
-    The error turns with the body of the platform.
+    The largest component of the error has a standard deviation of 1. The error turns with the body of the platform.
     """
     lever = _motion(mission, error.owner).lever_arm
     uncertainty = lever.uncertainty if lever is not None else None
@@ -188,10 +193,12 @@ _MOTION_DRAWS: Mapping[
 def _drawn_by_axis(
     motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Floats, Floats]]:
-    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component of `figure` is 1.
+    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component of the figure is 1.
 
-    Yields the index of the axis, the position error, (draws, times), and the tilt, (draws, times). The position error
-    assumes that an error of 1 causes an acceleration of 1. An axis without an error is omitted.
+    `figure` is a figure of the data sheet, such as the gyro bias. Yields the index of the axis, the position error,
+    (draws, times), and the tilt, (draws, times). The position error is computed as if one unit of the sensor error
+    caused an acceleration error of 1 m/s². To obtain the actual position error, the caller multiplies it by the
+    acceleration error per unit. An axis without an error is omitted.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.key, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
@@ -203,7 +210,7 @@ def _drawn_by_axis(
 def _swings(mission: Mission, name: str, times: Floats) -> Floats | None:
     """Motion of the antenna per unit of tilt about each axis, (axes, times, 3). [m/rad]
 
-    None if the mission file states no lever arm.
+    The result is None if the mission file states no lever arm.
     """
     motion, state = _motion(mission, name), getattr(mission.platforms, name).state
     if motion.lever_arm is None or motion.lever_arm.arm is None:
@@ -220,9 +227,9 @@ def _motion(mission: Mission, name: str) -> MotionError:
 def delay_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Draw group delays at the centre frequency for one sigma of the declared size, (draws, times). [m]
+    """Draw atmospheric group delays at the centre frequency for one sigma of the declared size, (draws, times). [m]
 
-    The delay is that of the path to one platform, or the sum over both platforms if both have the same atmosphere.
+    The delay is for the path to one platform, or the sum for both platforms if they have the same atmosphere.
     """
     return group_delays(mission, error, times, zenith_delays(mission, error, times, draws, rng))
 
@@ -232,7 +239,7 @@ def zenith_delays(
 ) -> Floats:
     """Draw zenith delays in units of the declared sigma, (draws, times).
 
-    They are correlated over time if the mission file states a correlation time, and otherwise constant.
+    The delays are correlated over time if the mission file states a correlation time, and constant otherwise.
     """
     correlation_time = correlation_time_of(mission, error.owner)
     if correlation_time is not None:
@@ -256,13 +263,13 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
     """Convert group delays due to free electrons to delays at a frequency of 1 Hz, as in `Errors.electrons`. [s·Hz²]
 
-    `group` are the group delays at the centre frequency, (times,). [m] `times` are their slow times. [s]
+    `group` (times,) [m] are the group delays at the centre frequency. `times` [s] are their slow times.
     """
     return Course(times, group / SPEED_OF_LIGHT_MPS * mission.radar.center_frequency**2)
 
 
 def has_unset_clocks(mission: Mission) -> bool:
-    """Whether the mission has oscillators for which the file does not state how they are set before the aperture.
+    """Whether there are oscillators for which the mission file does not state how they are set before the aperture.
 
     The phases of such oscillators are simulated without mean and slope.
     """
@@ -272,10 +279,10 @@ def has_unset_clocks(mission: Mission) -> bool:
 def drawn_errors(analysis: Analysis) -> Errors:
     """Draw a time series of each declared error of sensors, clocks and the atmosphere, and combine them for an image.
 
-    The random numbers have the seed of the mission. Each series is multiplied by the coverage factor. The phase of an
-    oscillator includes the error with which it was set before the aperture. It has no mean and no slope in two cases:
-    `timing_error` states the clock error that remains after the setting, or the oscillator runs freely and the file
-    does not state how it is set.
+    The random numbers are drawn with the seed of the mission. Each series is multiplied by the coverage factor. The
+    phase of an oscillator includes the error with which it was set before the aperture. Its mean and slope are
+    removed in two cases: `timing_error` states the clock error that remains after the setting, or the oscillator runs
+    freely and the file does not state how it is set.
     """
     mission = analysis.mission
     seed = (mission.simulation or Simulation()).seed
@@ -300,7 +307,7 @@ class _DrawnErrors:
     Parameters
     ----------
     mission : Mission
-        The mission, in one case.
+        The mission, with a single case.
     times : (n,)
         Slow times at which slowly changing errors are sampled. [s]
     noise_times : (m,)
@@ -315,17 +322,17 @@ class _DrawnErrors:
         self._air = dict.fromkeys(DELAYS, np.zeros(times.size))
 
     def add_motion(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the platform motion that a sensor, a lever arm or position noise causes, and add it to the motions."""
+        """Draw motion due to a sensor, a lever arm or position noise, and store it with the other motions."""
         for name, series in position_courses(self.mission, error, self.times, 1, rng).items():
             self._motions.append((name, Course(self.times, self.factor * series[0])))
 
     def add_delay(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the delay of the echoes in the atmosphere, and add it to the delays of the same kind."""
+        """Draw the delay of the echoes in the atmosphere, and add it to the sum of delays of the same kind."""
         (group,) = self.factor * delay_courses(self.mission, error, self.times, 1, rng)
         self._air[error.subject.axis] = self._air[error.subject.axis] + group
 
     def add_vibration(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw the random vibration of a platform as motion along the line of sight, and add it to the motions."""
+        """Draw random vibration of a platform along the line of sight, and store it with the other motions."""
         mission, times = self.mission, self.noise_times
         line_of_sight_error = (
             phase_courses(mission, error, times, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
@@ -343,8 +350,8 @@ class _DrawnErrors:
     def add_phase(self, error: RandomError, rng: np.random.Generator) -> None:
         """Draw the phase of an oscillator or of the synchronisation link, and add it to the phase of the echoes.
 
-        An error without an effect on the image is omitted. Mean and slope are removed in the cases that
-        `drawn_errors` names.
+        An error without an effect on the image is omitted. Mean and slope are removed in the two cases listed in
+        `drawn_errors`.
         """
         if not (error.published.spread or error.published.quadratic or error.full.displacement > 0):
             return
@@ -393,7 +400,7 @@ _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
 def _biased(order: int) -> _Draw:
-    """Return a function that draws a constant bias, and gives the position error and the tilt that the bias causes.
+    """Return a function that draws a constant bias, and returns the resulting position error and tilt.
 
     The position error is the bias times τⁿ/n!, with n = `order`. The tilt is the bias times τ^(n−2).
     """
@@ -406,7 +413,7 @@ def _biased(order: int) -> _Draw:
 
 
 def _walk(integrals: int) -> _Draw:
-    """Return a function that draws a position error and a tilt, both of which are integrals of white noise.
+    """Return a function that draws a random walk: a position error and a tilt that are integrals of white noise.
 
     The position error is the noise integrated `integrals` times, and the tilt is the same noise integrated once. The
     integrals start at mid-aperture. The noise before and after mid-aperture is independent.
@@ -435,7 +442,7 @@ def _walk(integrals: int) -> _Draw:
 
 
 def _correlated(correlation_time: float, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-    """First-order Gauss-Markov noise of variance 1, computed by its recursion over time, (draws, times)."""
+    """First-order Gauss-Markov noise with a variance of 1, (draws, times). It is computed by recursion over time."""
     noise = rng.standard_normal((times.size, draws))
     for index, step in enumerate(np.diff(times).tolist(), 1):
         decay = math.exp(-step / correlation_time)
@@ -463,11 +470,11 @@ def phase_courses(
     rng: np.random.Generator,
     highest: float = math.inf,
 ) -> Floats:
-    """Draw the phases at the centre frequency that a random error causes, for one sigma, (draws, times). [rad]
+    """Draw the phases at the centre frequency due to a random error of one sigma, (draws, times). [rad]
 
-    The error is that of an oscillator or of the synchronisation link, or a vibration. For the noise of an oscillator,
-    `error.declared` scales the amplitude. `times` are evenly spaced over the aperture. [s] Tones above
-    `highest` [Hz] may be omitted if pulse exchanges do not fold them to lower frequencies.
+    The error is an error of an oscillator or of the synchronisation link, or a vibration. For the noise of an
+    oscillator, `error.declared` scales the amplitude. `times` [s] are evenly spaced over the aperture. Tones above
+    `highest` [Hz] may be omitted, unless pulse exchanges fold them to lower frequencies.
     """
     return error.kind.find_in(_PHASE_DRAWS, error.subject.axis)(mission, error, times, draws, rng, highest)
 
@@ -475,10 +482,10 @@ def phase_courses(
 def _link_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, _highest: float
 ) -> Floats:
-    """Draw the phases that measurement errors of pulse exchanges cause, for one sigma, (draws, times). [rad]
+    """Draw the phases due to measurement errors of pulse exchanges, for one sigma, (draws, times). [rad]
 
-    Between exchanges the phase is interpolated linearly. If no exchange interval is stated, the phases are
-    independent at all times.
+    Between exchanges the phase is interpolated linearly. If the mission states no exchange interval, the phases at
+    different times are independent.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
@@ -504,10 +511,10 @@ def _vibration_phases(
 def _oscillator_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Draw the phases of an oscillator that its own noise causes, (draws, times). [rad]
+    """Draw the phases of an oscillator due to its own noise, (draws, times). [rad]
 
     Spurs are included if pulse exchanges fold them to low frequencies. If the oscillator is set before the aperture
-    and then runs freely, the error of the setting is included.
+    and then runs freely, the error of this setting is included.
     """
     sync, T, size = mission.synchronization, mission.collection.aperture_time, error.declared or 0.0
     pieces = noise_in_case(mission, error.owner).pieces
@@ -528,9 +535,9 @@ def _oscillator_phases(
 def _acceleration_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Draw the phases of an oscillator that acceleration of its platform causes, for one sigma, (draws, times). [rad]
+    """Draw the phases of an oscillator due to the acceleration of its platform, for one sigma, (draws, times). [rad]
 
-    The acceleration is that of random vibration, of slow vibration tones and of turns of the platform. Faster tones
+    The acceleration is caused by random vibration, by slow vibration tones and by turns of the platform. Faster tones
     are included if pulse exchanges fold them to low frequencies.
     """
     T, size = mission.collection.aperture_time, (error.declared or 0.0) / mission.allocation.coverage_factor
@@ -573,9 +580,9 @@ def _linked_phases(
 ) -> Floats | None:
     """Draw the oscillator phases that remain after correction by a synchronisation link, (draws, times). [rad]
 
-    The phases are for a unit error. The link exchanges pulses at a stated interval, or the receiver uses the direct
-    signal of the transmitter. The result is None without such a link. `tones` has a pair for each tone of the
-    oscillator: its amplitude without a link, and its residual tones after the exchanges.
+    The phases are for a unit error. With the link, the platforms exchange pulses at a stated interval, or the
+    receiver uses the direct signal of the transmitter. The result is None without such a link. `tones` contains a
+    pair for each tone of the oscillator: its amplitude without a link, and the tones that remain after the exchanges.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     if sync is None:
@@ -605,12 +612,12 @@ def _between_exchanges(
     rng: np.random.Generator,
     turn_phases: Sequence[Callable[[Floats], Floats]] = (),
 ) -> Floats:
-    """Draw phases, and subtract the straight lines between their values at pulse exchanges, (draws, times). [rad]
+    """Draw phases, and subtract straight lines between their values at successive pulse exchanges. [rad]
 
-    The period of the tones is a whole number of exchange intervals. The spacing of `times` is scaled slightly, so
-    that it also divides the period evenly. The scale differs from 1 by less than the ratio of the spacing to the
-    period.
-    `turn_phases`, if not empty, are further phases as functions of slow time, one function for each draw.
+    The result is (draws, times). The period of the tones is a whole number of exchange intervals. The spacing of
+    `times` is changed slightly, so that it also divides the period evenly. The relative change is less than the ratio
+    of the spacing to the period. `turn_phases`, if not empty, holds additional phases as functions of slow time, one
+    function for each draw.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -656,7 +663,7 @@ def _fastest(mission: Mission, error: RandomError) -> float:
 
 
 def fastest_shake(mission: Mission, error: RandomError) -> float:
-    """Highest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]
+    """Highest frequency in the spectrum of a vibration, or of an oscillator phase due to vibration. [Hz]
 
     The result is 0 for any other error.
     """
@@ -664,7 +671,7 @@ def fastest_shake(mission: Mission, error: RandomError) -> float:
 
 
 def slowest_shake(mission: Mission, error: RandomError) -> float:
-    """Lowest frequency in the spectrum of a vibration, or of the oscillator phase that a vibration causes. [Hz]
+    """Lowest frequency in the spectrum of a vibration, or of an oscillator phase due to vibration. [Hz]
 
     The result is 0 for any other error.
     """
@@ -688,10 +695,10 @@ _SHAKES: Mapping[str, Callable[[Mission, str], tuple[PowerLawPiece, ...]]] = {
 
 
 def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
-    """Sinusoidal motions of a platform that cause the same phases as the tones of its vibrating oscillator.
+    """Sinusoidal motions of a platform that cause the same phases as the vibration tones of its oscillator.
 
-    Only tones with at least one cycle per aperture are included. Slower tones are drawn by `phase_courses`. A tone
-    differs in phase by a quarter of a cycle from the vibration that causes it.
+    Only tones with at least one cycle per aperture are included; slower tones are drawn by `phase_courses`. A tone of
+    the oscillator is a quarter of a cycle out of phase with the vibration that causes it.
     """
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
@@ -710,10 +717,10 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
 
 
 def _folded_tones(tones: Sequence[tuple[float, LeftTone]], aperture_time: float) -> list[tuple[float, float]]:
-    """Frequencies [Hz] and amplitudes of the slow residual tones of an oscillator after pulse exchanges.
+    """Frequencies [Hz] and amplitudes of slow oscillator tones that remain after pulse exchanges.
 
-    Pulse exchanges fold fast tones to low frequencies. `tones` has a pair for each tone of the oscillator: its
-    amplitude without exchanges, and its residual tones. All amplitudes are for a unit error.
+    Pulse exchanges fold fast tones to low frequencies. `tones` contains a pair for each tone of the oscillator: its
+    amplitude without exchanges, and the tones that remain after them. All amplitudes are for a unit error.
     """
     return [
         (float(frequency), free * float(share))
@@ -727,7 +734,8 @@ class _TurnPhase:
     """Random oscillator phase due to slow vibration and turns of the platform, per unit of acceleration sensitivity.
 
     All directions of the sensitivity are equally likely, and so are all phases of a vibration tone. The standard
-    deviation of the effect of a turn is its effect in the most sensitive direction.
+    deviation of the phase due to a turn equals the phase that the turn would cause if the sensitivity had the
+    direction of the turn's acceleration.
     """
 
     def __init__(self, mission: Mission, name: str) -> None:
@@ -743,7 +751,7 @@ class _TurnPhase:
         ]
 
     def draw(self, rng: np.random.Generator) -> Callable[[Floats], Floats]:
-        """Draw a random phase, returned as a function that gives the phase [rad] at slow times [s]."""
+        """Draw a random phase. It is returned as a function that maps slow times [s] to phases [rad]."""
         direction, starts = rng.standard_normal(3), rng.uniform(0, 2 * math.pi, len(self.slow))
 
         def at(times: Floats) -> Floats:
@@ -768,7 +776,7 @@ def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
 
 
 def _cosines_and_sines(frequency: Floats, times: Floats) -> tuple[Floats, Floats]:
-    """Cosines and sines of tones of given frequencies at given times, (times, tones) each."""
+    """Cosines and sines of tones with given frequencies at given times, each (times, tones)."""
     turn = 2 * math.pi * np.multiply.outer(times, frequency)
     return np.cos(turn), np.sin(turn)
 
@@ -776,7 +784,7 @@ def _cosines_and_sines(frequency: Floats, times: Floats) -> tuple[Floats, Floats
 def _phasors(turns: float, count: int) -> Complexes:
     """Phasors exp(2πi·n·turns) of the harmonics n = 1 … `count`, (count,).
 
-    They apply at the time at which the fundamental has completed `turns` cycles.
+    They are the values of the harmonics when the fundamental has completed `turns` cycles.
     """
     side = math.isqrt(count) + 1
     coarse = np.exp(2j * math.pi * turns * np.arange(side + 1) * side)
@@ -788,9 +796,9 @@ Summed = TypeVar("Summed", np.float64, np.complex128)
 
 
 def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
-    """Sum the values of harmonics 1, 2 … that alias to the same harmonic of 0 … count - 1, (count,).
+    """Add the values of all harmonics 1, 2 … that have the same alias among the harmonics 0 … count - 1, (count,).
 
-    Such harmonics are equal at `count` evenly spaced times of the period.
+    Harmonics with the same alias have equal values at `count` evenly spaced times of a period.
     """
     padded = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
     padded[1 : values.size + 1] = values
@@ -799,27 +807,30 @@ def _folded(values: NDArray[Summed], count: int) -> NDArray[Summed]:
 
 
 def fast_steps(least: int) -> int:
-    """Number of samples for which an FFT is fast: at least `least`, and larger by at most a sixteenth."""
+    """Number of samples for which an FFT is fast.
+
+    It is at least `least`, and at most a sixteenth larger.
+    """
     unit = 1 << max(0, least.bit_length() - 5)
     return -(-least // unit) * unit
 
 
 def tones_at(amplitudes: Complexes, count: int) -> Floats:
-    """Sum of harmonics 1, 2 … at `count` evenly spaced times of one period, (count,).
+    """Sum of the harmonics 1, 2 … at `count` evenly spaced times of a period, (count,).
 
-    `amplitudes` are the complex amplitudes of the harmonics. The first time is the start of the period.
+    `amplitudes` holds the complex amplitudes of the harmonics. The first time is the start of the period.
     """
     sums: Floats = np.fft.ifft(_folded(amplitudes, count), norm="forward").real
     return sums
 
 
 def powers_at(powers: Floats, count: int) -> Floats:
-    """Powers of the harmonics 0 … count // 2 that represent harmonics 1, 2 … at `count` samples, (count // 2 + 1,).
+    """Powers of the harmonics 0 … count // 2 that replace harmonics 1, 2 … at `count` samples, (count // 2 + 1,).
 
-    The harmonics have random phases and the given powers. The samples are evenly spaced over the period, and keep
-    their covariance. The phase of harmonic k at sample n is 2πkn/count. Harmonic k + count has the same phase.
-    Harmonic count − k has the opposite phase, which makes no difference if the phases are random. The powers of these
-    harmonics are therefore added.
+    The replaced harmonics have random phases and the powers `powers`. The samples are evenly spaced over the period.
+    Their covariance is the same with the new harmonics. At sample n, harmonic k has the phase 2πkn/count. Harmonic k
+    + count has the same phase, and harmonic count − k has the opposite phase, which is equivalent if phases are
+    random. The powers of such harmonics are therefore added.
     """
     folded = _folded(powers, count)
     one_sided: Floats = folded[: count // 2 + 1].copy()
@@ -831,10 +842,10 @@ class _Tones:
     """Tones that represent a phase spectrum: fast tones in equal frequency steps, slow tones in finer steps.
 
     Fast tones are the harmonics of 1/`period`, where `period` [s] is by default four apertures. Slow tones have lower
-    frequencies, in logarithmic steps unless the edges `slow` of their frequency intervals [Hz] are given. A narrow
-    piece of the spectrum would contain few fast tones. It is represented by tones of its own, which follow the slow
-    tones in the arrays. Noise at frequencies above those of the fast tones is independent at each time, with the
-    standard deviation `rest`. [rad]
+    frequencies, in logarithmic steps, unless the edges of their frequency intervals [Hz] are given by `slow`. A
+    narrow piece of the spectrum, which would contain only a few fast tones, is represented by tones of its own; these
+    follow the slow tones in the arrays. Noise at frequencies above those of the fast tones is independent at each
+    time, with the standard deviation `rest`. [rad]
     """
 
     def __init__(
@@ -871,17 +882,17 @@ class _Tones:
         self.rest = math.sqrt(math.fsum(beyond))
 
     def draw_slow(self, draws: int, rng: np.random.Generator) -> Floats:
-        """Draw random amplitudes of the cosine and the sine of each slow tone, (2, draws, tones). [rad]
+        """Draw random amplitudes for the cosine and the sine of each slow tone, (2, draws, tones). [rad]
 
-        Tones of narrow pieces of the spectrum are included.
+        The tones of narrow pieces of the spectrum are included.
         """
         drawn: Floats = rng.standard_normal((2, draws, self.slow.size)) * self.slow_size
         return drawn
 
     def slow_at(self, times: Floats, drawn: Floats) -> Floats:
-        """Sums of the slow tones and the tones of narrow pieces at given times, (draws, times). [rad]
+        """Sum of the slow tones and the tones of narrow pieces of the spectrum at given times, (draws, times). [rad]
 
-        `drawn` are the amplitudes from `draw_slow`.
+        `drawn` holds the amplitudes returned by `draw_slow`.
         """
         coarse_times = times if times.size <= _COURSE_SAMPLES else np.linspace(times[0], times[-1], _COURSE_SAMPLES)
         cosines, sines = _cosines_and_sines(self.slow[: self.count], coarse_times)
@@ -894,10 +905,10 @@ class _Tones:
         return sums
 
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Draw sums of the fast tones and of the noise above them, at evenly spaced times, (draws, times). [rad]
+        """Draw the sum of the fast tones and of the noise above them at evenly spaced times, (draws, times). [rad]
 
-        The spacing of the times must divide the period of the tones evenly. If `later` is given, the result is the
-        change of the sum from each time t to t + `later`. [s]
+        The spacing of the times must divide the period of the tones evenly. If `later` [s] is given, the result is
+        the change of the sum from each time t to t + `later`.
         """
         count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
         square, white_variance = np.square(self.fast_size), self.rest**2
@@ -916,9 +927,9 @@ class _Tones:
         return sums
 
     def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
-        """Draw sums of all tones at evenly spaced times, (draws, times). [rad]
+        """Draw the sum of all tones at evenly spaced times, (draws, times). [rad]
 
-        If `later` is given, the result is the change of the sum from each time t to t + `later`. [s]
+        If `later` [s] is given, the result is the change of the sum from each time t to t + `later`.
         """
         slow = self.draw_slow(draws, rng)
         sums = self.slow_at(times, slow)
@@ -930,9 +941,9 @@ class _Tones:
 class _Setting:
     """Setting of a clock before the aperture, by a straight line fitted to its phase over an averaging time.
 
-    The middle of the averaging time is earlier than mid-aperture by `age`. [s] Slow tones are common to the averaging
-    time and the aperture. Tones are drawn independently for the averaging time if they are faster than a cycle per
-    eight apertures and complete more than two dozen cycles within the age of the setting.
+    The middle of the averaging time precedes mid-aperture by `age` [s]. Slow tones are the same in the averaging time
+    and in the aperture. Tones are drawn separately for the averaging time if they are faster than one cycle in eight
+    aperture times and complete more than two dozen cycles within `age`.
     """
 
     def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, age: float, averaging: float) -> None:
@@ -951,9 +962,9 @@ class _Setting:
         self.fast = _Tones(fast_pieces, averaging) if fast_pieces else None
 
     def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """Evaluate the lines fitted over the averaging time at times in the aperture, (draws, times). [rad]
+        """Evaluate the lines fitted to the clock phase over the averaging time, at times in the aperture. [rad]
 
-        `slow` are the amplitudes of the slow tones, as drawn by `_Tones.draw_slow`.
+        The result is (draws, times). `slow` holds the amplitudes of the slow tones, as drawn by `_Tones.draw_slow`.
         """
         lines = self.of_cosine @ slow[0].T + self.of_sine @ slow[1].T
         if self.fast is not None:
@@ -963,5 +974,8 @@ class _Setting:
 
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:
-    """Clock error [s] that causes a given phase at the centre frequency. [rad]"""
+    """Clock error that causes a given phase at the centre frequency. [s]
+
+    `phase` is in radians.
+    """
     return phase * wavelength_m / (2 * math.pi * SPEED_OF_LIGHT_MPS)

@@ -1,4 +1,4 @@
-"""Contents of a simulated scene, as given on the command line: point targets and clutter."""
+"""Contents of a simulated scene, as specified on the command line: point targets and clutter."""
 
 import csv
 import math
@@ -24,9 +24,9 @@ _MAX_LIST_BYTES = 1 << 20
 
 
 class Target(NamedTuple):
-    """Point target on the ground, with its position relative to the scene centre and its power.
+    """Point target on the ground: its position relative to the scene centre, and its power.
 
-    `east` and `north` are in metres. `level_db` is the power relative to that of a point of amplitude 1. [dB]
+    `east` and `north` are in metres. `level_db` is the power relative to a point of amplitude 1. [dB]
     """
 
     east: float = 0.0
@@ -37,7 +37,8 @@ class Target(NamedTuple):
 class Targets(NamedTuple):
     """Point targets of a scene, and the level of its clutter.
 
-    The level is the mean power of a pixel relative to the peak of a point of 0 dB. [dB] It is None without clutter.
+    The clutter level [dB] is the mean power of a pixel relative to the peak of a point of 0 dB. It is None if there
+    is no clutter.
     """
 
     points: tuple[Target, ...] = (Target(),)
@@ -45,11 +46,12 @@ class Targets(NamedTuple):
 
 
 def parse_targets(text: str) -> Targets:
-    """Read targets from `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, `grid:3x3:50 m`, or the name of a file.
+    """Read targets from text such as `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, `grid:3x3:50 m`, or a file name.
 
-    Entries are separated by semicolons. They are points, grids centred at the scene centre, and at most one clutter
-    level, with the units of a mission file. Numbers without a unit are in metres or decibels. An entry that ends in
-    .csv is the name of a file with the columns east [m], north [m], amplitude.
+    Entries are separated by semicolons. An entry is a point (east, north and optionally level), a grid of points
+    centred at the scene centre, or a clutter level, which may be given only once. Units are written as in a mission
+    file; numbers without a unit are in metres or decibels. An entry that ends in .csv is the name of a file with the
+    columns east [m], north [m] and amplitude.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def parse_targets(text: str) -> Targets:
 def _grid(entry: str) -> Iterator[Target]:
     """Yield points of 0 dB in a grid centred at the scene centre, from an entry `grid:NXxNY:SPACING`.
 
-    NX and NY are the numbers of points to the east and to the north.
+    NX and NY are the numbers of points in the east and north directions.
     """
     match = _GRID_PATTERN.fullmatch(entry)
     if match is None:
@@ -103,9 +105,10 @@ def _grid(entry: str) -> Iterator[Target]:
 
 
 def read_list(file: str) -> list[Target]:
-    """Read points from a CSV file with the columns east [m], north [m], amplitude.
+    """Read point targets from a CSV file with the columns east [m], north [m] and amplitude.
 
-    If the file cannot be read or a line is not a point, a `ValueError` names the file, the line and the reason.
+    A `ValueError` that names the file, the line and the reason is raised if the file cannot be read or a line is not
+    a valid point.
     """
     try:
         data = DISK.content(file, _MAX_LIST_BYTES)

@@ -1,6 +1,7 @@
 """Derivation of the polynomial in slow time from the exact bistatic ranges: (1) to (31) of Rigling & Moses.
 
-Each function derives one numbered equation from the one before it. For the frame and the units see `symbols`.
+Each function derives a numbered equation from an earlier equation. The frame and the units are described in
+`symbols`.
 """
 
 from functools import cache
@@ -40,15 +41,15 @@ _EPSILON = Symbol("epsilon", real=True)
 
 
 def distance(one: Matrix, other: Matrix) -> Expr:
-    """Distance between two points, d(τ) of (1). [m]"""
+    """Distance between two points, d(τ) of equation (1). [m]"""
     return sqrt(sum((r - x) ** 2 for r, x in zip(one, other, strict=True)))
 
 
 def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORM_SYMBOLS) -> Expr:
-    """Observed differential range ΔR̂_m of the scatterer m, by (1). [m]
+    """Observed differential range ΔR̂_m of the scatterer m, by equation (1). [m]
 
-    It is the sum of the true distances to a scatterer, minus the measured distances to the scene centre, plus the
-    clock error c·t̃.
+    It is the sum of the true distances from the platforms to the scatterer, minus the sum of the measured distances
+    to the scene centre, plus the clock error c·t̃.
     """
     total = c * Function("ttilde")(tau)
     for platform in platforms:
@@ -58,15 +59,15 @@ def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFOR
 
 
 def measured_error(platform: PlatformSymbols) -> Matrix:
-    """Error of a platform's measured position at one slow time, r̃ of (1), (3,). [m]"""
+    """Error of the measured position of a platform at a slow time, r̃ of equation (1), with shape (3,). [m]"""
     return ImmutableMatrix([real(f"{axis}tilde_{platform.subscript}") for axis in AXES])
 
 
 def direct_path_clock() -> Expr:
-    """Clock error c·t̃ of (1) for a receiver that takes the direct path as its clock. [m]
+    """Clock error c·t̃ of equation (1) for a receiver that uses the direct path as its clock. [m]
 
-    It is the measured minus the actual distance between the platforms. The receiver's clock is the direct signal,
-    which is delayed by the actual distance. The processor subtracts the measured distance.
+    It is the measured minus the actual distance between the platforms: the clock of the receiver is the direct
+    signal, which is delayed by the actual distance, and the processor corrects for the measured distance.
     """
     transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORM_SYMBOLS)
     actual = distance(*(platform.position for platform in PLATFORM_SYMBOLS))
@@ -74,21 +75,21 @@ def direct_path_clock() -> Expr:
 
 
 def exact_differential_range() -> Expr:
-    """Differential range of a point (x, y, z) without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
+    """Differential range of a point (x, y, z) without errors: equation (1) with r̃ = 0 and t̃ = 0. [m]"""
     free = dict.fromkeys((e for platform in PLATFORM_SYMBOLS for e in measured_error(platform)), 0)
     exact = observed_differential_range().subs(Function("ttilde")(tau), 0).subs(free)
     return exact.subs(dict(zip(scatterer, point, strict=True)))
 
 
 def far_field_differential_range() -> Expr:
-    """Return (5): the first-order Taylor expansion of (1) about the scene centre. [m]"""
+    """Return equation (5): the first-order Taylor expansion of equation (1) about the scene centre. [m]"""
     exact = exact_differential_range()
     at_origin = dict.fromkeys(point, 0)
     return sum(x * diff(exact, x).subs(at_origin) for x in point)
 
 
 def in_angles(expression: Expr) -> Expr:
-    """Express positions by slant range, azimuth and elevation, as in (6)."""
+    """Express positions by slant range, azimuth and elevation, as in equation (6)."""
     for platform in PLATFORM_SYMBOLS:
         R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
         spherical = (R * cos(phi) * cos(theta), R * sin(phi) * cos(theta), R * sin(theta))
@@ -98,14 +99,14 @@ def in_angles(expression: Expr) -> Expr:
 
 @cache
 def far_field_in_angles() -> Expr:
-    """Return (6): the differential range (5) in terms of azimuth and elevation. [m]"""
+    """Return equation (6): the differential range of equation (5) in terms of azimuth and elevation. [m]"""
     return in_angles(far_field_differential_range())
 
 
 def hold_range_constant(expression: Expr) -> Expr:
-    """Replace |r_k| by the constant R_k, and r_k by r_k + v_k·τ: the motion model of (17).
+    """Apply the motion model of equation (17): replace |r_k| by the constant R_k, and r_k by r_k + v_k·τ.
 
-    This is the main approximation of the paper: positions in numerators change with time, ranges do not. The full
+    This is the main approximation of the paper: positions in numerators change with time, but ranges do not. The full
     model does not use it.
     """
     for platform in PLATFORM_SYMBOLS:
@@ -116,16 +117,16 @@ def hold_range_constant(expression: Expr) -> Expr:
 
 
 def linear_differential_range() -> tuple[Expr, Expr]:
-    """Constant and linear coefficient β₀ and β₁ of the differential range, by (17). [m], [m/s]
+    """Constant and linear coefficients β₀ [m] and β₁ [m/s] of the differential range, by equation (17).
 
-    The plus sign between the two brackets is missing in the printed equation.
+    In the printed equation, the plus sign between the two brackets is missing.
     """
     beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range()))[:2]
     return beta_0, beta_1
 
 
 def coefficients(expression: Expr) -> tuple[Expr, ...]:
-    """Return the four coefficients of a cubic in slow time, the constant first."""
+    """Return the four coefficients of a cubic polynomial in slow time, beginning with the constant."""
     polynomial = Poly(expand(expression), tau)
     if polynomial.degree() > 3:
         raise ValueError(f"degree {polynomial.degree()} in slow time, at most 3 expected")
@@ -133,7 +134,7 @@ def coefficients(expression: Expr) -> tuple[Expr, ...]:
 
 
 def error_polynomial(platform: PlatformSymbols) -> Matrix:
-    """Position error r̃(τ) of a platform by (22), (3,): p̃ + ṽτ + ãτ²/2. [m]"""
+    """Position error r̃(τ) = p̃ + ṽτ + ãτ²/2 of a platform, by equation (22), as a vector of shape (3,). [m]"""
     return platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
 
 
@@ -143,24 +144,24 @@ def clock_polynomial() -> Expr:
 
 
 def first_order_range_error(platform: PlatformSymbols) -> Expr:
-    """Range error |r| − |r + r̃| of one platform, to first order in r̃ of (22): −r·r̃/|r|. [m]"""
+    """Range error |r| − |r + r̃| of one platform to first order in the error r̃ of equation (22): −r·r̃/|r|. [m]"""
     return _first_order(platform).subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
 
 
 def error_track(platform: PlatformSymbols) -> Matrix:
-    """Position error of a platform, (3,); its components are general functions of slow time, such as x̃_t(τ). [m]"""
+    """Position error of a platform as a vector (3,) of general functions of slow time, such as x̃_t(τ). [m]"""
     return ImmutableMatrix([Function(f"{axis}tilde_{platform.subscript}")(tau) for axis in AXES])
 
 
 def _first_order(platform: PlatformSymbols) -> Expr:
-    """Terms of one platform in (1) for a scatterer at the scene centre, to first order in its error. [m]"""
+    """First-order effect of a platform's position error on equation (1), for a scatterer at the scene centre. [m]"""
     return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)))
 
 
 def _grown(expression: Expr) -> Expr:
-    """Part of an expression that is of first order in the position errors of both platforms.
+    """Part of an expression that is of first order in the position errors of the platforms.
 
-    The position errors become general functions of slow time, as in `error_track`.
+    In the result, the position errors are general functions of slow time, as in `error_track`.
     """
     for platform in PLATFORM_SYMBOLS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
@@ -170,10 +171,10 @@ def _grown(expression: Expr) -> Expr:
 
 @cache
 def direct_path_range_error() -> Expr:
-    """First-order part of (1) for the scene centre if the direct path is the clock. [m]
+    """First-order part of equation (1) for the scene centre if the receiver uses the direct path as its clock. [m]
 
-    The errors may have any form over time. The slant ranges and the distance between the platforms have the symbols
-    R_t, R_r and D.
+    The errors may be arbitrary functions of time. The symbols R_t, R_r and D are the slant ranges and the distance
+    between the platforms.
     """
     observed = observed_differential_range().subs(dict.fromkeys(scatterer, 0))
     total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock()))
@@ -185,10 +186,10 @@ def direct_path_range_error() -> Expr:
 
 @cache
 def range_error_of_tracks() -> Expr:
-    """Return (23): error of the differential range for errors of any form over time. [m]
+    """Return equation (23): the error of the differential range for errors that are arbitrary functions of time. [m]
 
-    The processor subtracts the measured distance |r + r̃| and the data contain |r|, so (1) leaves |r| − |r + r̃| for
-    each platform. The result is of first order in r̃, with the motion model of (17).
+    The processor subtracts the measured distance |r + r̃|, but the data contain |r|, so equation (1) leaves |r| − |r
+    + r̃| for each platform. The result is of first order in r̃, with the motion model of equation (17).
     """
     total = c * Function("ttilde")(tau)
     for platform in PLATFORM_SYMBOLS:
@@ -198,7 +199,7 @@ def range_error_of_tracks() -> Expr:
 
 @cache
 def range_error() -> Expr:
-    """Return (23) with the error polynomials of (22) inserted: a cubic in slow time. [m]"""
+    """Return equation (23) with the error polynomials of equation (22) inserted: a cubic in slow time. [m]"""
     total = range_error_of_tracks().subs(Function("ttilde")(tau), clock_polynomial())
     for platform in PLATFORM_SYMBOLS:
         total = total.subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
@@ -206,31 +207,40 @@ def range_error() -> Expr:
 
 
 def ground_matrix() -> Matrix:
-    """Return Q of (19), (2, 2), the matrix that maps a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
+    """Return the 2 × 2 matrix Q of equation (19), which maps a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
     ground = Matrix(point[:2])
     return Matrix(linear_differential_range()).subs(point[2], 0).jacobian(ground)
 
 
 def ground_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q. The inverse Q⁻¹ of (30) is their quotient."""
+    """Adjugate (2, 2) and determinant of Q. The adjugate divided by the determinant is Q⁻¹ of equation (30)."""
     Q = ground_matrix()
     return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
 
 
 @cache
 def look_vector() -> Matrix:
-    """Horizontal components of the sum of the unit vectors to the platforms, (2,): (8) without the factor f/2. [-]"""
+    """Horizontal components of the sum of the unit vectors to the platforms, as a vector of shape (2,). [-]
+
+    This is equation (8) without the factor f/2.
+    """
     return ImmutableMatrix([-diff(far_field_in_angles(), x) for x in point[:2]])
 
 
 def look_azimuth() -> Expr:
-    """Bistatic look angle φ_b of (11), with atan2, because the printed arctan loses the quadrant. [rad]"""
+    """Bistatic look angle φ_b of equation (11). [rad]
+
+    It is computed with atan2, because the arctan in the printed equation loses the quadrant.
+    """
     s_x, s_y = look_vector()
     return atan2(s_y, s_x)
 
 
 @cache
 def smear_direction() -> Matrix:
-    """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear a response. [-]"""
+    """Return equation (31): the direction along which quadratic errors smear a response, with shape (2,). [-]
+
+    It is the direction of the second column of Q⁻¹.
+    """
     adjugate, _ = ground_inverse()
     return ImmutableMatrix(in_angles(adjugate[:, 1]))

@@ -1,9 +1,9 @@
 """Write the derived formulas to `bisar_budget/evaluators.py` and `bisar_budget/catalogue.py`.
 
-The evaluators are plain arithmetic without imports. The catalogue has the text of each formula by name, and its LaTeX
-and MathML by text, so that a report typesets formulas without SymPy. The output is deterministic: arguments, rows and
-common subexpressions have a fixed order, constants are literals, and there are no dates. Callers of the evaluators
-must prevent divisions by zero.
+The evaluators are plain arithmetic without imports. The catalogue maps the name of each formula to its text, and the
+text to LaTeX and MathML, so that a report can typeset formulas without SymPy. The output is deterministic: arguments,
+rows and common subexpressions have a fixed order, constants are literals, and there are no dates. Callers of the
+evaluators must prevent divisions by zero.
 """
 
 import textwrap
@@ -67,11 +67,11 @@ MathML the invisible times, so that numbers can be put in.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Function to be written to the generated module: its arguments in order, and its results as rows of expressions.
+    """Function to be written to the generated module: its arguments, and its results as rows of expressions.
 
-    The rows have names if there are several. An entry of `quotients` is a name, a numerator and a denominator. The
+    If there are several rows, they have names. An entry of `quotients` is a name, a numerator and a denominator; the
     name then replaces -numerator/denominator in the rows. If such a quotient is itself a result, arrays are divided
-    only once and no intermediate array is kept.
+    only once and no intermediate array is needed.
     """
 
     name: str
@@ -96,7 +96,7 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
 def platform_arguments(platform: PlatformSymbols) -> tuple[tuple[Symbol, str], ...]:
     """Arguments of an evaluator for one platform: position, velocity and slant range.
 
-    Each is a symbol and its name in the code. The names do not state which platform it is.
+    Each argument is a pair of a symbol and its name in the code. The names do not depend on the platform.
     """
     names = ("x", "y", "z", "v_x", "v_y", "v_z")
     motion = zip((*platform.position, *platform.velocity), names, strict=True)
@@ -104,9 +104,9 @@ def platform_arguments(platform: PlatformSymbols) -> tuple[tuple[Symbol, str], .
 
 
 def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
-    """Arguments of an evaluator for both platforms: horizontal position and velocity, and slant range of each.
+    """Arguments of an evaluator for both platforms: horizontal position, horizontal velocity and slant range of each.
 
-    Each is a symbol and its name in the code, which ends with `tx` or `rx`.
+    Each argument is a pair of a symbol and its name in the code, which ends with `tx` or `rx`.
     """
     arguments: list[tuple[Symbol, str]] = []
     for platform, suffix in ((TRANSMITTER, "tx"), (RECEIVER, "rx")):
@@ -120,7 +120,7 @@ def both_platforms_arguments() -> tuple[tuple[Symbol, str], ...]:
 def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
     """Return the effects of one unit of an error: β̃₀, β̃₁, and the quadratic and cubic phase at the aperture edge.
 
-    `beta` are the coefficients β̃₀ … β̃₃ of the range error. The phases have the sign of β̃₂ and β̃₃.
+    `beta` holds the coefficients β̃₀ … β̃₃ of the range error. The phases have the signs of β̃₂ and β̃₃.
     """
     per_unit = [published.sensitivity(term, error) for term in beta]
     return (
@@ -132,7 +132,7 @@ def effects(beta: Sequence[Expr], error: Symbol) -> tuple[Expr, ...]:
 
 
 def evaluators() -> tuple[Evaluator, ...]:
-    """Return all evaluators that `evaluators.py` contains, in the order of that file."""
+    """Return all functions of `evaluators.py`, in the order of that file."""
     beta = dr.coefficients(dr.range_error())
     # By kind, then axis: the order in which the tool reports them. Table I has them by axis, then kind.
     motion = (
@@ -231,7 +231,7 @@ def evaluators() -> tuple[Evaluator, ...]:
 def _of_random_errors() -> tuple[Evaluator, ...]:
     """Evaluators of the effects of random errors over an aperture.
 
-    Evaluators for random processes give mean squares.
+    Evaluators for random processes return mean squares of the effects.
     """
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
@@ -322,7 +322,7 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
 
 
 def _decimal(expression: Expr) -> Expr:
-    """Replace fractions such as 1/8 by decimal numbers if these are exact in binary."""
+    """Replace fractions such as 1/8 by decimal numbers if the decimal number is exact in binary."""
     dyadic = {r: Float(r) for r in expression.atoms(Rational) if r.q > 1 and r.q & (r.q - 1) == 0}
     return expression.xreplace(dyadic)
 
@@ -356,7 +356,7 @@ def _function(evaluator: Evaluator) -> str:
 
 
 def evaluators_module() -> str:
-    """Return the text of `evaluators.py` that the current derivation gives."""
+    """Return the text of `evaluators.py` as generated from the current derivation."""
     return _EVALUATORS + "".join(_function(evaluator) for evaluator in evaluators())
 
 
@@ -366,16 +366,16 @@ _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations for a report: first those of the paper, then those of the full model.
+    """Return the equations for a report: equations of the paper, followed by all equations of the full model.
 
-    Equation (30) is given for mid-aperture.
+    Equation (30) is included only for mid-aperture.
     """
     shown = (one for one in published.equations() if one.number in _SHOWN and not one.right.has(published.tau_i))
     return (*shown, *full.equations())
 
 
 def named() -> Iterator[tuple[str, Expr]]:
-    """Yield the name and the expression of each formula that explanations use."""
+    """Yield the name and the expression of each formula that is used in explanations of results."""
     columns: tuple[tuple[FormulaTable, Sequence[int]], ...] = (
         (published.table_1(), range(4)),
         (published.table_2(), [0]),
@@ -400,7 +400,7 @@ def named() -> Iterator[tuple[str, Expr]]:
 
 
 def formulas() -> Iterator[Expr]:
-    """All expressions of the catalogue: those with a name, and both sides of the equations."""
+    """Yield all expressions of the catalogue: the named formulas, and both sides of the equations."""
     yield from (formula for _, formula in named())
     for equation in equations():
         yield equation.left
@@ -408,7 +408,7 @@ def formulas() -> Iterator[Expr]:
 
 
 def catalogue_module() -> str:
-    """Return the text of `catalogue.py` that the current derivation gives."""
+    """Return the text of `catalogue.py` as generated from the current derivation."""
     every = {as_text(formula): formula for formula in formulas()}
     symbols = {as_text(s): s for formula in every.values() for s in formula.free_symbols}
     lines = [_CATALOGUE, "", "TEXTS: dict[str, str] = {"]

@@ -1,12 +1,13 @@
-"""The full model: all first-order terms of the range error, and the terms that the displacement of the image adds.
+"""The full model: all first-order terms of the range error, and the terms added by the displacement of the image.
 
-Rigling & Moses assume a constant range and use only the quadratic term. Here the line of sight turns: a position
-error r̃(τ) changes the range by −u(τ)·r̃(τ) to first order, with u(τ) the unit vector to the platform. The constant
-and linear terms displace the response to a point x̂ whose range history has the same terms. The range error minus
-this history defocuses the response. The model is derived here; it is not in the paper.
+Rigling & Moses assume a constant range and use only the quadratic term. Here the line of sight turns: to first order,
+a position error r̃(τ) changes the range by −u(τ)·r̃(τ), where u(τ) is the unit vector to the platform. The constant
+and linear terms displace the response to a point x̂ whose range history has the same terms. The range error minus the
+range history of this point defocuses the response. The model is derived here; it is not in the paper.
 
-Numerical results use `range_error_at` at the nodes of Gauss-Legendre quadrature, as in `ranges`, for any length of
-the aperture. The series about mid-aperture serves for comparison with Table I. For a short aperture both agree.
+Numerical results are computed from `range_error_at` at the nodes of Gauss-Legendre quadrature, as in `ranges`, and
+are valid for any length of the aperture. The series about mid-aperture is used for comparison with Table I. For a
+short aperture both agree.
 """
 
 from collections.abc import Sequence
@@ -58,9 +59,9 @@ DISPLACEMENT = ImmutableMatrix([real("xhat"), real("yhat")])
 
 
 def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
-    """Growth of the squared range for constant acceleration: |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴).
+    """Growth of the squared range under constant acceleration: |r|² = R²(1 + d₁τ + d₂τ² + d₃τ³ + d₄τ⁴).
 
-    Maps the symbol of each coefficient d₁ … d₄ to its expression. [1/sⁿ]
+    The result maps the symbol of each coefficient d₁ … d₄ to its expression. [1/sⁿ]
     """
     track = platform.position + platform.velocity * tau + platform.acceleration * tau**2 / 2
     square = Poly(expand(track.dot(track)), tau)
@@ -72,9 +73,9 @@ def growth(platform: PlatformSymbols) -> dict[Symbol, Expr]:
 
 @cache
 def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
-    """Derivatives of the line of sight u = r/|r| at τ = 0, orders 0 to 4, (3,) each. [1/sⁿ]
+    """Derivatives of orders 0 to 4 of the line of sight u = r/|r| at τ = 0, each a vector of shape (3,). [1/sⁿ]
 
-    They are expressed by the coefficients of `growth`.
+    They are expressed in terms of the coefficients of `growth`.
     """
     growth_sum = 1 + sum(d * tau**n for n, d in enumerate(growth(platform), start=1))
     inverse = [diff(1 / sqrt(growth_sum), tau, n).subs(tau, 0) / factorial(n) for n in range(SLOW_TIME_ORDER + 1)]
@@ -87,7 +88,7 @@ def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
 
 
 def range_error_at(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform at a slow time τ, to first order: −u·r̃(τ), with the line of sight u at τ. [m]"""
+    """Range error −u·r̃(τ) of one platform at a slow time τ, to first order; u is the line of sight at τ. [m]"""
     first_order = dr.first_order_range_error(platform)
     return first_order.subs(platform.exact_slant_range(), platform.slant_range)
 
@@ -96,7 +97,7 @@ def range_error_at(platform: PlatformSymbols) -> Expr:
 def range_error() -> tuple[Expr, ...]:
     """Coefficients β̃₀ … β̃₄ of the range error −Σ u(τ)·r̃(τ) + c·t̃(τ) as a polynomial in slow time. [m/sⁿ]
 
-    They are expressed by the derivatives of u at τ = 0.
+    They are expressed in terms of the derivatives of u at τ = 0.
     """
     total = c * dr.clock_polynomial()
     for platform in PLATFORM_SYMBOLS:
@@ -110,9 +111,9 @@ def range_error() -> tuple[Expr, ...]:
 
 
 def direct_range_error(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform if the direct path is the clock: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
+    """Range error of one platform if the direct path is used as the clock: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
 
-    The error may have any form over time; b is the unit vector from receiver to transmitter at that time.
+    The error may be an arbitrary function of time; b is the unit vector from receiver to transmitter at that time.
     """
     (other_platform,) = (
         platform_symbols for platform_symbols in PLATFORM_SYMBOLS if platform_symbols is not platform
@@ -123,27 +124,28 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
-    """Vector that replaces a platform's line of sight if the direct path is the clock: u_t − b or u_r + b, (3,).
+    """Vector that replaces the line of sight of a platform if the direct path is the clock: u_t − b or u_r + b.
 
-    A component is the decrease of the range error per metre of the platform's position error along that axis. [-]
+    It has the shape (3,). Each component is the decrease of the range error per metre of the platform's position
+    error along the respective axis. [-]
     """
     unit_sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
     return Matrix([-direct_range_error(platform).coeff(e).subs(unit_sight) for e in dr.error_track(platform)])
 
 
 def ground_history() -> tuple[Matrix, ...]:
-    """Derivatives at τ = 0 of s, the horizontal components of u_t + u_r, orders 0 to 4, (2,) each. [1/sⁿ]
+    """Derivatives of orders 0 to 4 at τ = 0 of s, the horizontal components of u_t + u_r, each of shape (2,). [1/sⁿ]
 
-    The range of a ground point x, relative to the scene centre, is −s(τ)·x.
+    The range of a ground point x relative to the scene centre is −s(τ)·x.
     """
     looks = zip(*(platform.look for platform in PLATFORM_SYMBOLS), strict=True)
     return tuple(Matrix([sum(u[axis] for u in looks_of_both) for axis in range(2)]) for looks_of_both in looks)
 
 
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
-    """Symbols of the ground gradients, and adjugate (2, 2) and determinant of Q = −[s; ṡ]. [-], [1/s]
+    """Symbols of the ground gradients, and the adjugate (2, 2) and determinant of Q = −[s; ṡ]. [-], [1/s]
 
-    The symbols are s_x, s_y, ṡ_x, ṡ_y. Q maps a ground point to the constant and the linear term of its range.
+    The symbols are s_x, s_y, ṡ_x and ṡ_y. Q maps a ground point to the constant and linear terms of its range.
     """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
@@ -151,10 +153,10 @@ def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
 
 
 def amplitude_share(own: Expr, other: Expr) -> Expr:
-    """Fraction of an allowable amplitude that a platform gets if both platforms share the amplitude.
+    """Fraction of an allowable amplitude that is allotted to a platform if both platforms share the amplitude.
 
-    `own` is the power share of the platform, and `other` the power share of the second platform. The amplitudes are
-    proportional to the square roots of the power shares.
+    `own` is the power share of this platform, and `other` is the power share of the second platform. The amplitudes
+    are proportional to the square roots of the power shares.
     """
     platform_part = positive("a")
     (solution,) = solve(Eq(platform_part * sqrt(other), (1 - platform_part) * sqrt(own)), platform_part)
@@ -162,7 +164,7 @@ def amplitude_share(own: Expr, other: Expr) -> Expr:
 
 
 def motion_of_phase(phase: Expr) -> Expr:
-    """Motion of one platform along its line of sight that causes a given phase by its one-way path change. [m]"""
+    """Motion of one platform along its line of sight that causes a given phase by changing the one-way path. [m]"""
     motion = positive("A")
     (solution,) = solve(Eq(published.one_way_phase(motion), phase), motion)
     return solution
@@ -171,8 +173,8 @@ def motion_of_phase(phase: Expr) -> Expr:
 def quartic_as_quadratic() -> Expr:
     """Coefficient of x² in the cubic polynomial that is fitted to x⁴ over −1 … 1: 6/7.
 
-    It follows from the projection on the second Legendre polynomial, because no other Legendre polynomial up to order
-    3 contains x².
+    It follows from the projection of x⁴ on the Legendre polynomial of order 2, because no other Legendre polynomial
+    up to order 3 contains x².
     """
     x = real("x")
     second = legendre(2, x)
@@ -180,22 +182,22 @@ def quartic_as_quadratic() -> Expr:
 
 
 def quadratic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Quadratic phase at the aperture edge for the range error with coefficients β₀ … β₄ in slow time. [rad]
+    """Quadratic phase at the aperture edge for a range error with the coefficients β₀ … β₄ in slow time. [rad]
 
-    It is the quadratic phase of the cubic polynomial that is fitted to the range error over the aperture. Therefore
-    β₄ also contributes to it.
+    It is the quadratic phase of a cubic polynomial that is fitted to the range error over the aperture. The quartic
+    term, with coefficient β₄, therefore also contributes.
     """
     quadratic, quartic = (published.edge_phase(coefficients[n], n) for n in (2, 4))
     return quadratic + quartic_as_quadratic() * quartic
 
 
 def cubic_phase(coefficients: Sequence[Expr]) -> Expr:
-    """Phase of the cubic term β₃ at the aperture edge. [rad]"""
+    """Phase of the cubic term, with coefficient β₃, at the aperture edge. [rad]"""
     return published.edge_phase(coefficients[3], 3)
 
 
 def displacement_coefficients() -> tuple[Expr, ...]:
-    """Change of the coefficients β₀ … β₄ by a displacement x̂ = (x̂, ŷ): +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
+    """Change of the coefficients β₀ … β₄ due to a displacement x̂ = (x̂, ŷ) of the image: +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
     return tuple(s.dot(DISPLACEMENT) / factorial(n) for n, s in enumerate(ground_history()))
 
 
@@ -208,9 +210,9 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 
 @cache
 def table() -> FormulaTable:
-    """Table of the coefficients β̃₀ … β̃₄ of the range error to first order, for the clock and each motion error.
+    """Table of the first-order coefficients β̃₀ … β̃₄ of the range error, for the clock error and each motion error.
 
-    The terms that the displacement adds are not included.
+    The terms that result from the displacement of the image are not included.
     """
     return FormulaTable(
         number="Full model",
@@ -227,7 +229,7 @@ def table() -> FormulaTable:
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """Equations of the turn of the line of sight, the displacement, and the coefficients that defocus a response."""
+    """Equations for the turn of the line of sight, the displacement, and the coefficients that defocus a response."""
     platform = PLATFORM_SYMBOLS[0]
     second, third, fourth = effective_coefficients()
     history = ground_history()
@@ -260,7 +262,7 @@ def equations() -> tuple[Equation, ...]:
 
 
 def _of_the_direct_path() -> tuple[Equation, ...]:
-    """Equations of the terms that replace u_t, u_r and t̃ if the receiver takes the direct path as its clock."""
+    """Equations for the terms that replace u_t, u_r and t̃ if the receiver uses the direct path as its clock."""
     direction = (TRANSMITTER.position - RECEIVER.position) / baseline
     return (
         Equation("", "Direct path, from receiver to transmitter", Symbol("b"), direction),
@@ -277,19 +279,20 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
 
 
 def _collected(coefficient: Expr) -> Expr:
-    """Write a coefficient as β̃ₙ, as given by `table`, plus the terms that the displacement adds."""
+    """Write a coefficient as the sum of β̃ₙ, given by `table`, and the terms that result from the displacement."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 
 
 @cache
 def vibration() -> FormulaTable:
-    """Table of vibration from first principles: the effect of a phase of peak φ or RMS σ, and the allowable motion.
+    """Table of vibration limits from first principles: power beside the response, and allowable motion.
 
-    The paired echoes of a sinusoid have the amplitude J₁(φ)/J₀(φ) relative to the response, φ/2 to first order. With
-    Gaussian noise, a fraction exp(-σ²) of the power stays in the response, and a fraction E of this is within its
-    first nulls. The ISLR is therefore (exp(σ²) - 1)/E. If both platforms vibrate at one frequency, they share the
-    amplitude. If both have independent noise, they share the power.
+    The phase has a peak φ or an rms value σ. The paired echoes of a sinusoid have the amplitude J₁(φ)/J₀(φ) relative
+    to the response, which is φ/2 to first order. With Gaussian noise, a fraction exp(-σ²) of the power stays in the
+    response. A fraction E of this remaining power is between the first nulls of the response. The ISLR is therefore
+    (exp(σ²) - 1)/E. If both platforms vibrate at the same frequency, they share the amplitude. If their noise is
+    independent, they share the power.
     """
     amplitude, rms, phase, platform_part, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
     first_order, zeroth_order = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))

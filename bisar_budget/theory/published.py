@@ -1,9 +1,9 @@
-"""Rigling & Moses as published: equations (1) to (31), Tables I and II, limits of vibration, and autofocus pull-in.
+"""Rigling & Moses as published: equations (1) to (31), Tables I and II, vibration limits, and autofocus pull-in.
 
 An equation is either defined as in the paper, or derived from earlier equations. The rows of the tables are derived
-in printed order. Errors of the printed paper are noted at the equation, and the equation given here is correct.
-Indices of sums are those of the paper: i counts frequencies, k pulses, m scatterers, and k_x and k_y the samples of
-the rectangular grid.
+in printed order. Misprints of the paper are noted at the equation, and the equation given here is the correct
+version. The indices of sums are as in the paper: i counts frequencies, k counts pulses, m counts scatterers, and k_x
+and k_y count the samples of the rectangular grid.
 """
 
 from collections.abc import Sequence
@@ -69,7 +69,7 @@ EQUAL_SHARE_QPE_RAD = pi / 8  # for each platform: half of the usual monostatic 
 class TableRow:
     """Row of a table: its printed number, the symbol of its error, and its cells from left to right.
 
-    `label` is the expression that is shown for the error, for example the error as a function of slow time.
+    `label` is the expression that is displayed for the error, for example the error as a function of slow time.
     """
 
     number: int | None
@@ -92,10 +92,10 @@ class FormulaTable:
 
 @dataclass(frozen=True)
 class Equation:
-    """Equation with its number in the paper; the number is empty for an equation that is not in the paper.
+    """Equation with its number in the paper. The number is empty for an equation that is not in the paper.
 
     `origin` is `defined` for a definition and `derived` for an equation that SymPy derives. `slip` describes the
-    mistake in the printed equation, if there is a mistake.
+    mistake in the printed equation, if there is one.
     """
 
     number: str
@@ -116,15 +116,15 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
 
 
 def single_error(expression: Expr, error: Symbol) -> Expr:
-    """Part of an expression that one error causes: the expression with all other errors set to zero."""
+    """Part of an expression that is due to a single error: the expression with all other errors set to zero."""
     every = [*clock_coefficients, *(e for platform in PLATFORM_SYMBOLS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
 def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableRow, ...]:
-    """Rows of a table of range-error coefficients: the first for the clock error, then one for each motion error.
+    """Rows of a table of range-error coefficients: a row for the clock error, then a row for each motion error.
 
-    `beta` are the coefficients with all errors. If `is_numbered`, the rows have the numbers of Table I.
+    `beta` holds the coefficients with all errors. If `is_numbered` is true, the rows have the numbers of Table I.
     """
     motion_free = {e: 0 for platform in PLATFORM_SYMBOLS for e in motion_errors(platform)}
     clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
@@ -159,7 +159,10 @@ def edge_phase(beta: Expr, order: int) -> Expr:
 
 
 def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
-    """Largest allowable magnitude of an error, at which `phase` equals `budget`; the phase is linear in the error."""
+    """Largest allowable magnitude of an error: the magnitude for which its phase `phase` reaches `budget`.
+
+    `phase` must be linear in the error.
+    """
     size = Symbol("size", positive=True)
     (solution,) = solve(Eq(Abs(phase.subs(error, size)), budget), size)
     return solution
@@ -169,7 +172,7 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
 def table_2() -> FormulaTable:
     """Table II: quadratic phase error and largest allowable error.
 
-    The absolute-value bars, which are missing in print, are added.
+    The absolute-value bars that are missing in the printed table are restored.
     """
     beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE_RAD
     rows = []
@@ -211,16 +214,16 @@ def table_2() -> FormulaTable:
 
 
 def one_way_phase(motion: Expr) -> Expr:
-    """Phase that a motion A of one platform along its line of sight causes by its one-way path, 2πA/λ. [rad]"""
+    """Phase 2πA/λ that a motion A of a platform along its line of sight causes by changing the one-way path. [rad]"""
     return 2 * pi * motion / wavelength
 
 
 @cache
 def vibration() -> FormulaTable:
-    """Table of the vibration limits of Section V: amplitude and rms along the line of sight, for a share of power.
+    """Table of the vibration limits of Section V: allowable amplitude and rms value along the line of sight.
 
-    A phase of peak φ causes paired echoes. The paper quotes the rule of Carrara et al., Table 5.12: (2πA/λ)² ≤ PSLR
-    and (2πσ/λ)² ≤ ISLR. Powers add, so the allowable power is multiplied by the share s of a platform.
+    A phase with a peak φ causes paired echoes. The paper quotes the rule of Carrara et al., Table 5.12: (2πA/λ)² ≤
+    PSLR and (2πσ/λ)² ≤ ISLR. Powers add, so the allowable power of a platform is multiplied by its power share s.
     """
     amplitude, rms = positive("A"), positive("sigma")
 
@@ -244,15 +247,15 @@ def vibration() -> FormulaTable:
 
 
 def pull_in_factor() -> Expr:
-    """Factor by which autofocus raises a limit, if it corrects up to π·N_pull radians: π·N_pull / total QPE.
+    """Factor by which autofocus raises a limit if it corrects up to π·N_pull radians: π·N_pull / total QPE.
 
-    Section VI defines N_pull. For a total quadratic phase error (QPE) of π/4 the factor is 4·N_pull.
+    N_pull is defined in Section VI. For a total quadratic phase error (QPE) of π/4 the factor is 4·N_pull.
     """
     return pi * n_pull / total_qpe
 
 
 def sensitivity(expression: Expr, error: Symbol) -> Expr:
-    """Effect of one unit of an error, for an expression that is linear in the error."""
+    """Effect of one unit of an error: the derivative of an expression that is linear in the error."""
     slope = diff(expression, error)
     if slope.has(error):
         raise ValueError(f"not linear in {error}")
@@ -283,12 +286,12 @@ piece_range = tuple(real(f"beta_{n}i") for n in range(2))
 
 
 def phase(differential_range: Expr) -> Expr:
-    """Return (2): phase of a sample for a scatterer with a given differential range. [rad]"""
+    """Return equation (2): the phase of a sample for a scatterer with a given differential range. [rad]"""
     return -2 * pi * f_i * differential_range / c
 
 
 def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
-    """Replace the angles at mid-aperture by angles at a slow time: φ̄_t by φ_t(τ_k), and so on."""
+    """Replace the angles at mid-aperture by the angles at a slow time, for example φ̄_t by φ_t(τ_k)."""
     for platform in PLATFORM_SYMBOLS:
         s = platform.subscript
         expression = expression.subs(
@@ -298,14 +301,14 @@ def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
 
 
 def spatial_frequencies() -> Matrix:
-    """Spatial frequencies by equation (8), −f/2 times the gradient of (6); the result has the shape (3,). [Hz]"""
+    """Spatial frequencies of equation (8): −f/2 times the gradient of equation (6), with shape (3,). [Hz]"""
     return Matrix([f_i / 2 * expand(-diff(dr.far_field_in_angles(), x)) for x in point])
 
 
 def rotation(x: Expr, y: Expr) -> Matrix:
-    """Components of a vector along the look direction φ_b, and 90° counter-clockwise from it.
+    """Components of a vector along the look direction φ_b, and 90° counter-clockwise from it, with shape (2,).
 
-    They follow from equations (9) and (10). The result has the shape (2,).
+    They follow from equations (9) and (10).
     """
     return Matrix([x * cos(phi_b) + y * sin(phi_b), -x * sin(phi_b) + y * cos(phi_b)])
 
@@ -313,27 +316,27 @@ def rotation(x: Expr, y: Expr) -> Matrix:
 def unrotated(x: Expr, y: Expr) -> Matrix:
     """Components along x and y of a vector that is given in the rotated coordinates of equations (9) and (10).
 
-    The result has the shape (2,).
+    The result is a vector of shape (2,).
     """
     return rotation(x, y).subs(phi_b, -phi_b)
 
 
 def exponent(products: Expr) -> Expr:
-    """Exponent −jΦ of the matched filter in the far field, with the phase Φ of (2).
+    """Exponent −jΦ of the far-field matched filter, with the phase Φ of equation (2).
 
-    `products` is x·f_x + y·f_y + z·f_z. By (6) and (8) it equals −f·ΔR/2.
+    `products` is x·f_x + y·f_y + z·f_z. By equations (6) and (8) it equals −f·ΔR/2.
     """
     together = real("products")
     return (-I * phase(-2 * together / f_i)).subs(together, products)
 
 
 def turned_products(f_x: Expr, f_y: Expr) -> Expr:
-    """Scalar product x·f_x + y·f_y in the rotated coordinates of (9) and (10): x′·f′_x + y′·f′_y."""
+    """Scalar product x·f_x + y·f_y in the rotated coordinates of equations (9) and (10): x′·f′_x + y′·f′_y."""
     return simplify(unrotated(x_turned, y_turned).dot(unrotated(f_x, f_y)))
 
 
 def summed(over_frequencies_and_pulses: Expr) -> Expr:
-    """Mean of an expression over all frequencies and pulses, as in (4)."""
+    """Mean of an expression over all frequencies and pulses, as in equation (4)."""
     inner = Sum(over_frequencies_and_pulses, (i, 1, frequencies), (k, 1, pulses))
     return inner / (frequencies * pulses)
 
@@ -344,7 +347,7 @@ def received() -> Expr:
 
 
 def grid() -> tuple[Expr, Expr]:
-    """Return (13): the rectangular grid of rotated spatial frequencies. [Hz]"""
+    """Return equation (13): the rectangular grid of rotated spatial frequencies. [Hz]"""
     return f_0 + B_x * k_x / N_x, -B_y / 2 + B_y * k_y / N_y
 
 
@@ -356,7 +359,7 @@ def half_angle(theta: Expr) -> Expr:
 
 
 def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
-    """Sum of exp(−j·step·n) over n = 0 … count − 1, as a phasor times a quotient of sines.
+    """Sum of exp(−j·step·n) over n = 0 … count − 1, written as a phasor times a quotient of sines.
 
     Returns the exponent of the phasor, and the quotient.
     """
@@ -366,7 +369,7 @@ def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
 
 
 def response() -> Expr:
-    """Return (16): the filter (14) applied to the samples (15), with two Dirichlet kernels for each scatterer."""
+    """Return equation (16): the filter (14) applied to the samples (15), with two Dirichlet kernels per scatterer."""
     # The sums for one scatterer are separable: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)) times the same in y′.
     whole, kernels = [], []
     for offset, start, band, count in (
@@ -388,21 +391,21 @@ def general_matrix() -> Matrix:
 
 
 def observed_polynomial() -> tuple[Expr, ...]:
-    """Coefficients β̂₀ … β̂₃ of (24): the sum of (17) and (23) in each order."""
+    """Coefficients β̂₀ … β̂₃ of equation (24): for each order, the sum of the coefficients of (17) and (23)."""
     scatterer = beta[0] + beta[1] * tau
     error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
     return dr.coefficients(scatterer + error)
 
 
 def tangent() -> tuple[Expr, Expr]:
-    """Return (27) and (28): value and slope at τ_i of the range error, which is a cubic. [m], [m/s]"""
+    """Return equations (27) and (28): the value [m] and the slope [m/s] of the cubic range error at τ_i."""
     error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
     return error.subs(tau, tau_i), diff(error, tau).subs(tau, tau_i)
 
 
 @cache
 def piece_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q_i in (30), which is Q for the platform positions at τ_i.
+    """Adjugate (2, 2) and determinant of Q_i in equation (30): the matrix Q for the platform positions at τ_i.
 
     The ranges keep their values at mid-aperture.
     """
@@ -421,13 +424,13 @@ def column(*names: str) -> Matrix:
 
 
 def product(*factors: Expr) -> Expr:
-    """Product of matrices that is displayed but not multiplied out."""
+    """Product of matrices that is displayed without being multiplied out."""
     return MatMul(*(ImmutableMatrix(f) if isinstance(f, MatrixBase) else f for f in factors), evaluate=False)
 
 
 @cache
 def equations() -> tuple[Equation, ...]:
-    """Return all numbered equations of the paper in order, and the autofocus gain of Section VI."""
+    """Return all numbered equations of the paper in order, followed by the autofocus gain of Section VI."""
     return (*_data(), *_images(), *_point_response(), *_ground_point(), *_errors(), *_effects())
 
 

@@ -1,13 +1,12 @@
-"""Random errors over one aperture: quadratic phase, cubic phase and ISLR from noise of sensors and clocks.
+"""Random errors over one aperture: quadratic phase, cubic phase and ISLR due to noise of sensors and clocks.
 
-An error x over the aperture is a sum of Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace the response. The
-coefficient of order 2 times 3/2 is the quadratic phase at the aperture edge. The coefficient of order 3 times 5/2 is
-the cubic phase. The rest of the mean square spreads over the image. The part of a tone of frequency f in order n is
-(2n + 1)·jₙ(πfT), so a spectrum is integrated with the square of this factor. A range error has the one-way phase k·x,
-k =
-2π/λ. All formulas are derived here; the paper has no random errors.
+An error x over the aperture is expanded in Legendre polynomials Pₙ(2τ/T). Orders 0 and 1 displace the response. The
+quadratic phase at the aperture edge is 3/2 times the coefficient of order 2, and the cubic phase is 5/2 times the
+coefficient of order 3. All higher orders spread energy over the image. A tone of frequency f and amplitude 1 has the
+coefficient (2n + 1)·jₙ(πfT) in order n, so a spectrum is integrated with the square of this factor. A range error x
+causes the one-way phase k·x with k = 2π/λ. All formulas are derived here; the paper does not treat random errors.
 
-Spectra are one-sided. Values are for one sigma. Axes and platforms are independent.
+Spectra are one-sided. Values are for one sigma. Errors of different axes and platforms are independent.
 """
 
 from collections.abc import Callable
@@ -62,7 +61,7 @@ _x, _m, _M, _w = real("xi"), positive("m"), positive("M"), positive("w")
 
 
 class Moments(NamedTuple):
-    """Mean squares of the parts of an error over an aperture.
+    """Mean squares of the quadratic, cubic and remaining parts of an error over an aperture.
 
     `quadratic` and `cubic` are the mean squares of the quadratic and the cubic part at the aperture edge. `left` is
     the mean square of the remainder beyond the cubic part, averaged over the aperture.
@@ -78,11 +77,11 @@ class Moments(NamedTuple):
 
 
 class PlaceMoments(NamedTuple):
-    """Moments of Legendre orders 0 and 1 of an error, the constant and the linear part, which displace the response.
+    """Moments of the constant and linear parts of an error (Legendre orders 0 and 1), which displace the response.
 
     `constant` and `linear` are the mean squares of the two parts. `constant_quadratic` and `linear_cubic` are the
-    mean products of constant and quadratic part, and of linear and cubic part. All parts are taken at the aperture
-    edge. For processes that are symmetric in time, even and odd orders are uncorrelated.
+    mean products of the constant and quadratic parts, and of the linear and cubic parts. All parts are taken at the
+    aperture edge. For processes that are symmetric in time, even and odd orders are uncorrelated.
     """
 
     constant: Expr
@@ -97,8 +96,8 @@ _PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # pairs of orders of the field
 def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
     """Compute the moments of an error from the mean squares of its Legendre coefficients.
 
-    `coefficients` are the mean squares of the coefficients of P₀ … P₃. `mean_square` is the mean square of the whole
-    error, averaged over the aperture.
+    `coefficients` holds the mean squares of the coefficients of P₀ … P₃. `mean_square` is the mean square of the
+    whole error, averaged over the aperture.
     """
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
     return Moments(
@@ -110,11 +109,11 @@ def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
 
 # ---------------------------------------------------------------------- inertial sensors
 def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Expr]:
-    """Covariance function of an error that starts from zero at mid-aperture and is driven by white noise.
+    """Covariance function of an error that is driven by white noise and starts from zero at mid-aperture.
 
-    The arguments of the function are two times m ≤ M after mid-aperture. `response` gives the error as a function of
-    the time since a unit impulse of the noise. The noise before mid-aperture is independent of the noise after
-    mid-aperture.
+    The arguments of the covariance function are two times m ≤ M after mid-aperture. `response` returns the error as a
+    function of the time since a unit impulse of the noise. The noise before mid-aperture is independent of the noise
+    after it.
     """
 
     def covariance(m: Expr, M: Expr) -> Expr:
@@ -125,7 +124,7 @@ def _from_middle(response: Callable[[Expr], Expr]) -> Callable[[Expr, Expr], Exp
 
 @cache
 def walk(order: int) -> Moments:
-    """Moments of white noise of unit density, integrated `order` times from mid-aperture, for T = 1."""
+    """Moments of white noise of unit density, integrated `order` times from mid-aperture, for an aperture T = 1."""
     covariance = _from_middle(lambda t: t ** (order - 1) / factorial(order - 1))
     squares = []
     for n in range(ORDER_COUNT):
@@ -137,7 +136,7 @@ def walk(order: int) -> Moments:
 
 
 def constant(order: int) -> Moments:
-    """Moments of τⁿ/n! for T = 1, with n = `order`.
+    """Moments of the function τⁿ/n! with n = `order`, for an aperture T = 1.
 
     This is the position error of a constant acceleration (n = 2) or of a constant rate of acceleration (n = 3).
     """
@@ -150,7 +149,7 @@ def constant(order: int) -> Moments:
 
 
 class SensorFigure(NamedTuple):
-    """Figure of merit of an inertial sensor: symbol, name, explanation, and moments of its phase.
+    """Figure of an inertial sensor's data sheet: symbol, name, explanation, and moments of the phase that it causes.
 
     The moments are the mean squares of the phase for one unit of the figure.
     """
@@ -163,9 +162,9 @@ class SensorFigure(NamedTuple):
 
 @cache
 def inertial() -> tuple[SensorFigure, ...]:
-    """Figures of merit of an inertial sensor, in the order of the mission file.
+    """Figures of an inertial sensor's data sheet, in the order of the mission file.
 
-    The moments of each figure are those of the phase over one aperture. [rad²/unit²]
+    The moments of each figure are mean squares of the phase over one aperture. [rad²/unit²]
     """
     k = one_way_phase(Integer(1))
 
@@ -186,7 +185,7 @@ def inertial() -> tuple[SensorFigure, ...]:
 
 # ---------------------------------------------------------------------- Gauss-Markov
 def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
-    """Antiderivative of polynomial·exp(rate·x) without the factor exp(rate·x), by repeated integration by parts."""
+    """Antiderivative of polynomial·exp(rate·x), divided by exp(rate·x), by repeated integration by parts."""
     total, sign = Integer(0), 1
     for order in range(polynomial.degree() + 1):
         total += sign * polynomial.as_expr() / rate ** (order + 1)
@@ -197,7 +196,7 @@ def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
 def _gauss_markov_coefficients(m: int, n: int) -> Expr:
     """Mean product of the coefficients of Pₘ and Pₙ for a Gauss-Markov process of variance 1.
 
-    Both orders must be even or both odd.
+    m and n must be both even or both odd.
     """
     first, second = (Poly(legendre(order, _x), _x) for order in (m, n))
     # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)). The factor r is the same for Pₘ and −a,
@@ -212,14 +211,14 @@ def _gauss_markov_coefficients(m: int, n: int) -> Expr:
 def gauss_markov() -> Moments:
     """Moments of a stationary Gauss-Markov process with variance 1 and correlation exp(−|t|/τ_c).
 
-    They are expressed by the symbols `ratio`, T/(2τ_c), and `decay`, exp(−T/τ_c).
+    They are expressed in terms of the symbols `ratio` for T/(2τ_c) and `decay` for exp(−T/τ_c).
     """
     return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDER_COUNT)), Integer(1))
 
 
 @cache
 def gauss_markov_place() -> PlaceMoments:
-    """`PlaceMoments` of the process of `gauss_markov`, in terms of `ratio` and `decay`."""
+    """Moments of the constant and linear parts of the process of `gauss_markov`, in terms of `ratio` and `decay`."""
     return PlaceMoments(*(LEADING_RATIONALS[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
 
 
@@ -227,18 +226,18 @@ def gauss_markov_place() -> PlaceMoments:
 def gauss_markov_slow() -> tuple[Expr, ...]:
     """Power series in `ratio` of the moments of `gauss_markov` and `gauss_markov_place`.
 
-    They are used if the correlation time is much longer than the aperture, because the terms of the exact expressions
-    then nearly cancel.
+    They are used if the correlation time is much longer than the aperture, where the terms of the exact expressions
+    nearly cancel.
     """
     exact = (*gauss_markov(), *gauss_markov_place())
     return tuple(_series(moment.subs(decay, exp(-2 * ratio)), ratio) for moment in exact)
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
-    """Series about zero of a sum of terms, each a power of a variable times exponentials, sines or cosines.
+    """Series about zero of a sum whose terms are powers of a variable times exponentials, sines or cosines.
 
-    The terms of the sum cancel at zero. The functions are replaced by their Taylor polynomials, which are exact up to
-    their order. SymPy expands the resulting sums of powers quickly.
+    The terms of the sum cancel at zero. The functions are replaced by Taylor polynomials, which are exact up to their
+    order. SymPy can expand the resulting sums of powers quickly.
     """
     powers = range(4 * ORDER_COUNT + 2 * SERIES_TERMS)
     taylor = {
@@ -255,7 +254,7 @@ def _series(expression: Expr, variable: Symbol) -> Expr:
 
 # ---------------------------------------------------------------------- spectra
 def spherical_bessel(n: int) -> Expr:
-    """Spherical Bessel function jₙ(x), as the integral ½∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1.
+    """Spherical Bessel function jₙ(x), computed as the integral ½∫ Pₙ(t)·cos(xt − nπ/2) dt over −1 … 1.
 
     A tone of amplitude 1 has the amplitude (2n + 1)·jₙ(x) in Legendre order n, with x = πfT.
     """
@@ -266,9 +265,9 @@ def spherical_bessel(n: int) -> Expr:
 
 @cache
 def tone() -> Moments:
-    """Quadratic and cubic phase of a phase tone of amplitude 1, and the share of its power beyond the cubic phase.
+    """Quadratic and cubic phase of a phase tone of amplitude 1, and the share of its power beyond the cubic part.
 
-    Unlike in other `Moments`, the two phases are not mean squares but amplitudes at the aperture edge.
+    In contrast to other `Moments`, the two phases are amplitudes at the aperture edge and not mean squares.
     """
     amplitudes = [spherical_bessel(n) for n in range(ORDER_COUNT)]
     remaining_share = 1 - sum((2 * n + 1) * amplitude**2 for n, amplitude in enumerate(amplitudes))
@@ -278,27 +277,27 @@ def tone() -> Moments:
 
 
 def tone_place() -> tuple[Expr, Expr]:
-    """Amplitudes of the constant part and of the linear part at the aperture edge, for a tone of amplitude 1."""
+    """Amplitudes of the constant part, and of the linear part at the aperture edge, of a tone of amplitude 1."""
     return spherical_bessel(0), 3 * spherical_bessel(1)
 
 
 @cache
 def tone_in_terms() -> tuple[Expr, ...]:
-    """Expressions of `tone` and `tone_place`, with symbols for the sine and the cosine of `angle`, which is πfT."""
+    """Expressions of `tone` and `tone_place` with symbols for the sine and the cosine of `angle` = πfT."""
     return tuple(expression.subs({sin(angle): sine, cos(angle): cosine}) for expression in (*tone(), *tone_place()))
 
 
 def tone_slow() -> tuple[Expr, ...]:
-    """Power series of `tone` and `tone_place` in `angle`, πfT, for a tone that is slow compared with the aperture."""
+    """Power series of `tone` and `tone_place` in `angle` = πfT, for tones that are slow relative to the aperture."""
     return tuple(_series(expression, angle) for expression in (*tone(), *tone_place()))
 
 
 def tone_fast() -> tuple[Expr, ...]:
     """Mean squares and mean products of the parts of a fast tone, as in `Moments` and `PlaceMoments`.
 
-    Products of sine and cosine are averaged over a cycle. The results are in terms of `inverse`, the even inverse
-    powers of `angle`. The part of order n is shifted in phase by n quarters of a cycle, so orders n and n + 2 have
-    opposite signs.
+    Products of sines and cosines are averaged over a cycle. The results are expressed in terms of `inverse`, the
+    symbols for the even inverse powers of `angle`. The part of order n is shifted in phase by n quarters of a cycle,
+    so orders n and n + 2 have opposite signs.
     """
     quadratic, cubic, left, constant, linear = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
@@ -323,9 +322,9 @@ def power_law_integral(n: int, slope: int) -> Expr:
 
 @cache
 def power_law(order: int) -> tuple[Expr, ...]:
-    """Mean squares of a phase at the aperture edge, for phase spectra f⁻ⁿ of density 1, n = 0 … 4. [s^(n−1)]
+    """Mean squares of the quadratic or cubic phase at the aperture edge, for power-law phase spectra. [s^(n−1)]
 
-    `order` is 2 for the quadratic and 3 for the cubic phase.
+    The phase spectra are f⁻ⁿ with n = 0 … 4. `order` is 2 for the quadratic phase and 3 for the cubic phase.
     """
     return tuple(
         (LEADING_RATIONALS[order] * (2 * order + 1)) ** 2 * power_law_integral(order, slope) * T ** (slope - 1)
@@ -334,18 +333,18 @@ def power_law(order: int) -> tuple[Expr, ...]:
 
 
 def passed() -> Expr:
-    """Amplitude of a tone of amplitude 1 after sampling and linear interpolation: sinc²(f·T_s).
+    """Amplitude of a tone after sampling and linear interpolation, relative to its original amplitude: sinc²(f·T_s).
 
-    It is the Fourier transform of a triangle.
+    It is the Fourier transform of the triangular interpolation kernel.
     """
     fraction = positive("nu")
     return simplify(2 * integrate((1 - fraction) * cos(step * fraction), (fraction, 0, 1)))
 
 
 def interpolated() -> Expr:
-    """Share of a tone's power that remains after the straight lines between its samples are subtracted.
+    """Fraction of a tone's power that remains after subtracting the straight lines between its samples.
 
-    The share is a function of y = 2πf·T_s. It is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each
+    The fraction is a function of y = 2πf·T_s. It is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each
     frequency to which the tone is folded.
     """
     fraction = positive("nu")
@@ -356,7 +355,7 @@ def interpolated() -> Expr:
 
 
 def interpolated_noise() -> Expr:
-    """Mean square of straight lines that connect independent samples of variance 1, averaged over time."""
+    """Mean square over time of straight lines that connect independent samples of variance 1."""
     fraction = positive("nu")
     return integrate((1 - fraction) ** 2 + fraction**2, (fraction, 0, 1))
 
@@ -367,9 +366,9 @@ _acceleration, _frequency, _time = positive("a"), positive("f"), real("t")
 
 
 def vibrating_oscillator() -> Expr:
-    """Peak of the phase error ∫2πf₀·y dt of an oscillator under the acceleration a·cos(2πft). [rad]
+    """Peak of the phase error ∫2πf₀·y dt of an oscillator that is subjected to the acceleration a·cos(2πft). [rad]
 
-    y is its relative frequency error, and f₀ the centre frequency of the radar.
+    y is the relative frequency error of the oscillator, and f₀ is the centre frequency of the radar.
     """
     y = sensitivity * _acceleration * cos(2 * pi * _frequency * _time)
     phase = integrate(2 * pi * center_frequency * y, _time)
@@ -377,15 +376,16 @@ def vibrating_oscillator() -> Expr:
 
 
 def vibrating_path() -> Expr:
-    """Amplitude of the displacement that an acceleration a·cos(2πft) causes, apart from uniform motion. [m]"""
+    """Amplitude of the displacement due to an acceleration a·cos(2πft), apart from uniform motion. [m]"""
     wave = cos(2 * pi * _frequency * _time)
     return simplify(-integrate(integrate(_acceleration * wave, _time), _time) / wave)
 
 
 def of_spectrum(amplitude: Expr) -> Expr:
-    """Power spectrum of a phase or another effect, caused by accelerations with the power spectrum S_a.
+    """Power spectrum of a phase or another effect, due to accelerations with the power spectrum S_a.
 
-    `amplitude` is the amplitude of the effect of a sinusoidal acceleration. It is proportional to the acceleration.
+    `amplitude` is the amplitude of the effect that a sinusoidal acceleration causes. It must be proportional to the
+    amplitude of the acceleration.
     """
     return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
 
@@ -393,7 +393,7 @@ def of_spectrum(amplitude: Expr) -> Expr:
 # ---------------------------------------------------------------------- for a reader
 @cache
 def table() -> FormulaTable:
-    """Table of the phases at the aperture edge for each figure of merit of an inertial sensor."""
+    """Table of the phases at the aperture edge that each data-sheet figure of an inertial sensor causes."""
     rows = tuple(
         TableRow(
             number=None,
@@ -420,7 +420,7 @@ def table() -> FormulaTable:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Equations of random errors, in the order of the module.
+    """Equations of random errors, in the order of this module.
 
     They give the phases of a tone, the mean squares for power-law spectra, the errors that remain after interpolation
     between synchronisations, and the effects of vibration.

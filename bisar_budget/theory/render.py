@@ -1,4 +1,4 @@
-"""Write the derived equations and tables as text, LaTeX, Markdown or MathML, with the numbers of the paper."""
+"""Write the derived equations and tables as text, LaTeX, Markdown or MathML, with the paper's equation numbers."""
 
 import re
 import textwrap
@@ -54,13 +54,13 @@ _COMMANDS = {
 
 
 def _operator(name: str) -> str:
-    r"""Name of an operator in LaTeX; GitHub refuses `\operatorname` ("macros are not allowed")."""
+    r"""Name of an operator in LaTeX, without `\operatorname`, which GitHub rejects ("macros are not allowed")."""
     return rf"\mathop{{\mathrm{{{name}}}}}"
 
 
 @dataclass(frozen=True)
 class _Name:
-    """Parts of a symbol's name: `vtilde_xt` is v with a tilde and the subscript xt."""
+    """Parts of a symbol's name. For example, `vtilde_xt` is the letter v with a tilde and the subscript xt."""
 
     letter: str
     accent: str
@@ -198,9 +198,9 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
         return row
 
     def without_fences(self, node: Any) -> Any:
-        """Replace each `mfenced` element by brackets that are operators.
+        """Replace each `mfenced` element by brackets that are written as operators.
 
-        SymPy 1.13 writes `mfenced`, which browsers no longer draw. SymPy 1.14 writes brackets itself.
+        SymPy 1.13 writes `mfenced`, which browsers no longer display. SymPy 1.14 writes brackets itself.
         """
         for child in list(node.childNodes):
             node.replaceChild(self.without_fences(child), child)
@@ -237,17 +237,17 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
 
 
 def as_text(expression: Basic) -> str:
-    """Write an expression as one line of plain text: `π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)`."""
+    """Write an expression as one line of plain text, such as `π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)`."""
     return str(_Text().doprint(expression)).replace("**", "^")
 
 
 def as_latex(expression: Basic, times: str = " ") -> str:
-    """Write an expression in LaTeX without delimiters; `times` is put between factors."""
+    """Write an expression in LaTeX without delimiters. `times` is inserted between factors."""
     return str(_Latex({"mul_symbol": times, "imaginary_unit": "j"}).doprint(expression))
 
 
 def as_mathml(expression: Basic) -> str:
-    """Write an expression in presentation MathML, as one `math` element."""
+    """Write an expression in presentation MathML, as a single `math` element."""
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML">{as_mathml_content(expression)}</math>'
 
 
@@ -266,7 +266,7 @@ def as_mathml_content(expression: Basic) -> str:
 
 
 def derivation(selection: str, format_name: str) -> str:
-    """Text that `bisar-budget derive` prints for a selection.
+    """Return the text that `bisar-budget derive` prints for a selection.
 
     The selections are `all`, `equations`, `I`, `II`, `vibration`, `full` and `random`.
     """
@@ -294,7 +294,7 @@ def derivation(selection: str, format_name: str) -> str:
 
 
 def numbered(number: int, format_name: str) -> str:
-    """Write all equations of the paper that have the number `number`, in the format `format_name`."""
+    """Write all equations of the paper with the number `number`, in the format `format_name`."""
     return _EQUATION_RENDERERS[format_name](
         _TITLE, tuple(e for e in published.equations() if e.number == f"({number})")
     )
@@ -306,7 +306,7 @@ _TITLE = "Equations of Rigling & Moses"
 def _heading(equation: Equation) -> str:
     """Number and title of an equation.
 
-    For an equation of the paper, it also states whether the equation is a definition or derived by SymPy.
+    For an equation of the paper, the text also tells whether it is a definition or derived by SymPy.
     """
     return f"{equation.number} {equation.title} [{equation.origin}]" if equation.number else equation.title
 

@@ -1,7 +1,8 @@
 """The symbols of Rigling & Moses, with names that all printers can typeset.
 
-A name is `<letter>[tilde|bar|hat]_<subscript>`: `vtilde_xt` is the transmitter's velocity error along x. Frame: scene
-centre at the origin, ground plane z = 0, x east, y north, z up. SI units and radians.
+Names have the form `<letter>[tilde|bar|hat]_<subscript>`: `vtilde_xt` is the transmitter's velocity error along x.
+Frame: scene centre at the origin, ground plane z = 0, x east, y north, z up. All quantities are in SI units, angles
+in radians.
 """
 
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ AXES = ("x", "y", "z")
 
 
 def real(name: str) -> Symbol:
-    """Return a real symbol."""
+    """Return a real SymPy symbol with the given name."""
     return Symbol(name, real=True)
 
 
 def positive(name: str) -> Symbol:
-    """Return a positive symbol."""
+    """Return a positive SymPy symbol with the given name."""
     return Symbol(name, positive=True)
 
 
@@ -39,10 +40,10 @@ n_pull = positive("N_pull")  # autofocus corrects up to π·N_pull radians
 
 @dataclass(frozen=True)
 class PlatformSymbols:
-    """Symbols of one platform at the aperture midpoint, and of the error of its measured motion.
+    """Symbols for the motion of one platform at mid-aperture, and for the errors of its measured motion.
 
-    Vectors are (3,), east-north-up. [m], [m/s], [m/s²] `look` are the unit vector from the scene centre to the
-    platform and its first four derivatives. [1/sⁿ] The model of the paper uses neither `look` nor the acceleration.
+    Vectors are (3,), east-north-up, in m, m/s and m/s². `look` holds the unit vector from the scene centre to the
+    platform and its first four derivatives [1/sⁿ]. The model of the paper uses neither `look` nor the acceleration.
     """
 
     name: str
@@ -59,13 +60,13 @@ class PlatformSymbols:
     elevation: Symbol
 
     def exact_slant_range(self) -> Expr:
-        """Return |r| in terms of the components of the position. [m]"""
+        """Return the slant range |r| as an expression of the components of the position. [m]"""
         # Matrix.norm() puts real components into Abs, which prevents simplification of their squares.
         return sqrt(sum(component**2 for component in self.position))
 
 
 def platform(name: str, subscript: str) -> PlatformSymbols:
-    """Return the symbols of one platform, with the subscripts of the paper."""
+    """Return the symbols of one platform, with subscripts as in the paper."""
 
     def vector(letter: str) -> Matrix:
         return ImmutableMatrix([real(f"{letter}_{axis}{subscript}") for axis in AXES])

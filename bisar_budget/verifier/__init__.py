@@ -1,4 +1,4 @@
-"""Verifies limits with simulated images that contain errors exactly at their limits. Needs NumPy."""
+"""Verify limits with simulated images that contain errors exactly at their limits. Needs NumPy."""
 
 # What other rooms may use.
 __all__ = [

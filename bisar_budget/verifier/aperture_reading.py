@@ -1,12 +1,12 @@
-"""Measures the phase of an error over the aperture in a small image of a point target (a chip).
+"""Measure the phase of an error over the aperture in a small image of a point target (a chip).
 
 The contribution of each pulse to each pixel follows from exact ranges along the measured paths. The phase over the
-aperture is modelled as a polynomial. The polynomial is fitted to the pixels themselves, so sidelobes that the finite
-image cuts off cause no error. The fit starts from the effect that exact ranges predict. The residual of the fit shows
-whether the polynomial describes the image. If it does not, the image is correlated with the contribution of each
-pulse, which gives the phase of the pulse. This correlation corresponds to a projection of the image spectrum to slow
-time. It takes range walk and curved lines of equal range into account. The error-free response is formed and measured
-with the same paths, so that effects common to both responses cancel.
+aperture is modelled as a polynomial, which is fitted to the pixels themselves, so that sidelobes cut off by the
+finite image cause no error. The fit starts from the effect that exact ranges predict. Its residual shows whether the
+polynomial describes the image. If it does not, the image is correlated with the contribution of each pulse, which
+gives the phase of the pulse. This correlation corresponds to a projection of the image spectrum onto slow time, but
+takes range walk and curved lines of equal range into account. The error-free response is formed and measured with the
+same paths, so that effects common to both responses cancel.
 """
 
 import math
@@ -55,11 +55,11 @@ _KERNEL_CELLS = np.linspace(0, 64, 4097)  # range cells of a tapered range respo
 class ApertureReading(NamedTuple):
     """Quadratic and cubic phase of a response at the edge of the aperture [rad], with the sign of the range error.
 
-    `across_pixels` is the offset of the response along y′ from the middle of the image. It follows from the linear
-    part of the phase. `walked_pixels` is the offset of the response's centre of gravity along x′ that the quadratic
-    part and higher parts of the phase cause: a pulse at slow time τ contributes at the range e(τ) − τ·e′(τ), where
-    e is the range error. `coverage` is the fraction of the aperture that
-    the patch contains. It is 1 unless the smeared response leaves the patch.
+    `across_pixels` is the offset of the response from the middle of the image along y′. This offset follows from the
+    linear part of the phase. `walked_pixels` is the offset of the response's centre of gravity along x′ that is due
+    to the quadratic and higher parts of the phase: a pulse at slow time τ contributes at the range e(τ) − τ·e′(τ),
+    where e is the range error. `coverage` is the fraction of the aperture whose response is within the patch. It is 1
+    unless the smeared response extends beyond the patch.
     """
 
     quadratic: float
@@ -83,17 +83,18 @@ def read_aperture(
     Parameters
     ----------
     collection, errors
-        Collection and errors from which the chips were formed. The measured paths contain the errors.
+        Simulated collection, and the errors in it. The data for `chip` contain these errors. Both chips are formed
+        along the same measured paths, which contain the errors of the paths.
     centre : (2,) float
-        Middle of the chips on the ground (east, north), which is the position of the reference. [m]
+        Ground point (east, north) at the middle of the chips, which is the position of the error-free response. [m]
     chip, reference : Chip
         Images with and without errors, on the same pixels.
     half_lines : int
-        Largest distance of a used line from the middle line. Every second line is used. With 0, only the middle line
-        is used. [lines]
+        Largest distance from the middle line up to which image lines are used [lines]. Every second line is used. If
+        it is 0, only the middle line is used.
     expected : ExactEffect, optional
-        Predicted effect, from which the fit starts. If it is omitted, or if no polynomial near it fits the pixels, a
-        fit starts from the phases of single pulses.
+        Predicted effect, from which the fit starts. If it is None, or if no polynomial close to it fits the pixels,
+        the fit starts from the phases of single pulses.
 
     Raises
     ------
@@ -139,7 +140,10 @@ def read_aperture(
 
 
 class _Pixels:
-    """Pixels of an image, at positions (n, 3) [m], and the contributions of pulses to them for a point target."""
+    """Pixels of an image at positions (n, 3) [m], and the contributions of single pulses to them.
+
+    The contributions are computed for a point target.
+    """
 
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
@@ -152,10 +156,10 @@ class _Pixels:
             self.kernel = np.cos(2 * math.pi * np.outer(_KERNEL_CELLS, frequency)) @ weights / 257
 
     def contributions(self, slow_time: Floats, remaining_range: Floats | None = None) -> NDArray[np.complex64]:
-        """Compute the contributions of pulses (m,) to the pixels (n,) at baseband, (m, n).
+        """Contributions of m pulses to the n pixels of a baseband image, (m, n).
 
-        `slow_time` (m,) are the times of the pulses [s]. `remaining_range` (m,) is a range error that moves the range
-        responses without changing the phase [m]. If it is None, the range responses are not moved.
+        `slow_time` (m,) [s] holds the times of the pulses. `remaining_range` (m,) [m] is a range error that shifts
+        the range responses without changing the phase. If it is None, the range responses are not shifted.
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
@@ -195,7 +199,7 @@ def _squares(points: Floats) -> Floats:
 def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
     """Distances (m, n) from positions (m, 3) to points (n, 3), accurate to 1e-8 m even from geostationary orbit. [m]
 
-    `squares` (n,) are the squared norms of the points [m²].
+    `squares` (n,) holds the squared norms of the points. [m²]
     """
     square: Floats = positions @ (-2 * points.T)
     square += _squares(positions)[:, None]
@@ -206,11 +210,11 @@ def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
 def _fit_to_pulses(
     pulse_pixels: _Pixels, slow_time: Floats, images: Sequence[Complexes], columns: int
 ) -> tuple[Floats, float]:
-    """Fit a polynomial to the phases of single pulses, and measure the part of the aperture that these pulses cover.
+    """Fit a polynomial to the phases of single pulses, and determine which part of the aperture these pulses cover.
 
     Returns the Legendre coefficients of the polynomial over the aperture [rad], and the covered fraction of the
     aperture. The fraction is 0 if the pulses in the middle of the aperture are missing, or if too few pulses remain.
-    `images` are the image with errors and the error-free image, at the same pixels, in lines of `columns` pixels.
+    `images` holds the image with errors and the error-free image at the same pixels, in lines of `columns` pixels.
     """
     scaled_time = 2 * slow_time / pulse_pixels.collection.aperture_time
     # Taper at both ends of a line; each tapered end is half as long as a response without smear.
@@ -249,7 +253,7 @@ def _fit_to_pulses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """Phase polynomial that is fitted to an image, with Legendre coefficients `fit` over the aperture [rad].
+    """Phase polynomial fitted to an image: its Legendre coefficients `fit` over the aperture [rad], and its misfit.
 
     `misfit` is the norm of the residual of the fit divided by the norm of the image.
     """
@@ -259,9 +263,9 @@ class _Refined:
 
 
 class _Fitting:
-    """Fits phase polynomials over the aperture to the pixels of an image.
+    """Fits of phase polynomials over the aperture to the pixels of an image.
 
-    In a large image only every n-th pixel is used, so that the computation fits into memory.
+    If the image is large, only every n-th pixel is used, so that the computation fits into memory.
     """
 
     def __init__(
@@ -284,8 +288,8 @@ class _Fitting:
     def refined(self, fit: Floats) -> _Refined:
         """Refine a phase polynomial, given by its Legendre coefficients `fit` [rad], by fitting it to the pixels.
 
-        A fit uses the range walk that follows from the coefficients at its start. If several image lines are used,
-        the fit is done twice. The second fit then uses the range walk that the first fit gives.
+        The fit uses the range walk that follows from the initial coefficients. If several image lines are used, the
+        fit is repeated once with the range walk that follows from the first fit.
         """
         collection = self.fitted_pixels.collection
         scaled_time = 2 * self.slow_time / collection.aperture_time
@@ -302,9 +306,9 @@ class _Fitting:
 def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: Complexes, gain: complex) -> _Refined:
     """Fit a phase polynomial to the pixels of an image by Gauss-Newton steps.
 
-    The steps start from the Legendre coefficients `fit` [rad]. A step that does not reduce the residual is halved.
-    `contribution` are the contributions of the pulses to the pixels, (pulses, pixels). `gain` is the complex
-    amplitude of the error-free response.
+    The first step starts from the Legendre coefficients `fit` [rad]. A step that does not reduce the residual is
+    halved. `contribution` holds the contributions of the pulses to the pixels, (pulses, pixels). `gain` is the
+    complex amplitude of the error-free response.
     """
     legendre = np.polynomial.legendre.legvander(scaled_time, fit.size - 1)
     norm = float(np.linalg.norm(image))
@@ -341,10 +345,9 @@ def _refined(fit: Floats, scaled_time: Floats, contribution: Complexes, image: C
 # ---------------------------------------------------------------------- displacement
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Displacement of a response on the ground (east, north) [m], and azimuth of its smear line, 0 to π [rad].
+    """Displacement of a response on the ground (east, north) [m], and azimuth of the line along which it is smeared.
 
-    The smear line is the line along which the response is smeared. `pixels` is the same displacement along x′ and y′
-    of the image. [pixels]
+    The azimuth is between 0 and π [rad]. `pixels` [pixels] is the same displacement along x′ and y′ of the image.
     """
 
     displacement: GroundVector
@@ -353,22 +356,22 @@ class Shift:
 
 
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
-    """Measure the displacement of a response from an error-free response on the same grid, and its smear line.
+    """Measure the displacement of a response from an error-free response on the same grid, and its smear direction.
 
-    Without a `reading`, the displacement is the vector between the two peaks. A response that is smeared too much has
-    no single peak. For such a response, `reading` gives the phase over its aperture. The displacement along y′ then
-    follows from the slope of the phase. The displacement along x′ is the centre of gravity minus the offset that the
-    quadratic part and higher parts of the phase cause.
+    If `reading` is None, the displacement is the vector between the two peaks. A response that is strongly smeared
+    has no single peak, so `reading` must provide the phase over its aperture. The displacement along y′ then follows
+    from the slope of the phase. The displacement along x′ is the centre of gravity minus the offset that is due to
+    the quadratic and higher parts of the phase.
 
-    Each part of the aperture displaces the point differently, as in (26) to (28) of Rigling & Moses for three parts.
-    These displacements follow from the spectrum of the image. They are the gradient of its phase relative to an
-    error-free response. Their spread is the smear. This method also measures a smear far smaller than a resolution
-    cell, which is not yet visible in the shape of the response.
+    Each part of the aperture displaces the point differently; equations (26) to (28) of Rigling & Moses describe this
+    for three parts. These displacements follow from the spectrum of the image: they are the gradient of its phase
+    relative to the error-free response. Their spread is the smear. This method can measure a smear far smaller than a
+    resolution cell, which is not yet visible in the shape of the response.
 
     Raises
     ------
     ValueError
-        The spectra share no support: one of the two responses is not in the image.
+        The spectra do not overlap: one of the two responses is not in the image.
     """
     spectra = [np.fft.fftshift(np.fft.fft2(member.image)) for member in (chip, reference)]
     product = spectra[0] * np.conj(spectra[1])
@@ -404,7 +407,7 @@ def _step(product: Complexes, axis: int) -> Floats:
 def _pixel_vectors(grid: Floats) -> Floats:
     """Ground vectors from pixel to pixel along x′ and y′ at the middle of the grid, (2, 2). [m]
 
-    The vectors are the columns of the matrix, with the components east and north.
+    The vectors are the columns of the matrix. Their components are east and north.
     """
     i, j = grid.shape[0] // 2, grid.shape[1] // 2
     columns = (grid[i + 1, j] - grid[i - 1, j], grid[i, j + 1] - grid[i, j - 1])
@@ -423,20 +426,20 @@ def refocused(
 ) -> Chip:
     """Estimate the phase error over the aperture from the middle lines of a chip, and remove it from all lines.
 
-    The autofocus function `algorithm` makes the estimate from the middle line and from `half_lines` lines on either
-    side of it.
+    The autofocus function `algorithm` estimates the phase from the middle line and `half_lines` lines on either side
+    of it.
 
     Along a line of equal range, each pulse has its own spatial frequency, which follows from the measured paths. Over
     a long aperture, or if the range and Doppler gradients are nearly parallel, equal time intervals occupy unequal
-    parts of the band. A quadratic phase in time is then not quadratic in frequency. An estimate in frequency would
-    lose the part of the aperture that is compressed into a few per cent of the band. Therefore the spectra of the
-    lines are sampled at equal time steps. The phase is estimated at these times, and then converted to the
-    frequencies of the image.
+    parts of the band. A quadratic phase in time is then not quadratic in frequency. An estimate as a function of
+    frequency would lose a part of the aperture that is compressed into a few per cent of the band. Therefore the
+    spectra of the lines are sampled at equal time steps. The phase is estimated at these times, and then interpolated
+    to the frequencies of the image.
 
     Raises
     ------
     ValueError
-        The frequency does not change in one direction over the aperture.
+        The spatial frequency does not change monotonically over the aperture.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING_FACTOR)))
@@ -470,7 +473,8 @@ def _frequency(
 ) -> Floats:
     """Spatial frequency of each pulse along the middle line of a chip, (times,). [cycles/pixel]
 
-    It is computed at the centre of the line. The spatial frequency of the removed carrier phase is subtracted.
+    It is computed at the centre of the line. The spatial frequency of the carrier phase, which is removed from the
+    image, is subtracted.
     """
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2

@@ -67,11 +67,11 @@ def verify_mission(
 ) -> VerifiedMission:
     """Verify every limit of a mission whose row id matches the glob pattern `only`.
 
-    The verdicts are in the order of the rows of `check`. They include the vibration of both platforms together. They
-    do not depend on `jobs`, the number of processes. After each row `progress` is called with the number of finished
-    rows and the number of all rows. `mapped`, if given, is a function that computes the rows on remote workers
-    instead of in processes on this machine.
-    `analysis` is that of the mission, if the caller has made it.
+    The verdicts are in the order of the rows of `check`. They include verdicts on the vibration of both platforms
+    together. They do not depend on `jobs`, the number of processes. After each row `progress` is called with the
+    number of finished rows and the total number of rows. `mapped`, if given, is a function that verifies the rows on
+    remote workers instead of in processes on this machine. `analysis` is the analysis of the mission, if the caller
+    already has it.
     """
     mission = mission._replace(places={})  # the places of keys cannot be sent to a process and are not needed
     all_cases = cases(Study(mission, analysis), only)
@@ -96,7 +96,7 @@ def verify_mission(
 
 
 def rows_to_verify(mission: Mission, only: str = "*", analysis: Analysis | None = None) -> list[str]:
-    """List the ids of the rows that `verify_mission` would verify."""
+    """Ids of the rows that `verify_mission` would verify."""
     return list(cases(Study(mission, analysis), only))
 
 
@@ -111,8 +111,8 @@ def cases(study: Study, only: str = "*") -> dict[str, Case]:
 def _warns_of_the_total(study: Study) -> bool:
     """Whether `check` has a row for the mission's total quadratic phase under the rule `combine: each`.
 
-    `check` adds this row, as a warning, if the root-sum-square of all errors exceeds the mission's limit on quadratic
-    phase although no single error exceeds it.
+    Under this rule, the row is only a warning. `check` adds it if every single error is within the mission's limit on
+    quadratic phase, but the root-sum-square of all errors exceeds this limit.
     """
     aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
     rows = (row for model in study.models for row in aggregates.rows(model.name))
@@ -134,12 +134,12 @@ def _conditions(mission: Mission) -> Iterator[str]:
 
 
 def _order(vibration: Subject) -> tuple[int, int]:
-    """Sort key that orders the vibrations of an owner as in `check`: single tones, groups of tones, noise."""
+    """Sort key that puts the vibrations of an owner in the order of `check`: single tones, groups of tones, noise."""
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(vibration.axis), vibration.entry or 0)
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Yield the id and the verifying function of each row of sensors, clocks and sidelobes that has a limit.
+    """Yield each row of sensors, clocks and sidelobes that has a limit: its id, and a function that verifies it.
 
     These are the rows of random errors, of errors that the file states by their ISLR, of oscillator tones, of PSLR,
     and of ISLR.
@@ -210,11 +210,11 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
 
 # ---------------------------------------------------------------------- how long it will take
 class _NotFormedError(ValueError):
-    """Raised instead of forming an image, as soon as the size of the image is known."""
+    """The image is not formed, because only its size was needed."""
 
 
 class _Sizes(PointCollection):
-    """A collection that only records the size of every requested image, to estimate the computing time."""
+    """A collection that forms no images but records their sizes, which are used to estimate the computing time."""
 
     def __init__(self, mission: Mission, study: Study) -> None:
         super().__init__(mission, study.geometry)
@@ -235,14 +235,14 @@ class _Sizes(PointCollection):
     def window(self, count: int) -> Floats:
         """Raise `_NotFormedError` instead of returning a window, so that no noise is drawn.
 
-        Noise takes seconds to draw, whatever the size of the images.
+        Drawing noise would take seconds, even for small images.
         """
         raise _NotFormedError(f"{count} weights are not needed")
 
     def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CUT_CELLS, **_: object) -> Chip:
         """Record the size of an image that is a single line, and raise `_NotFormedError` instead of forming it.
 
-        The recorded size also includes the second image of the same size with which the image would be compared.
+        The recorded size includes the image of the same size with which it would be compared.
         """
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))
@@ -253,8 +253,8 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1, analysis
     """Estimate the time that `verify_mission` will take. [s]
 
     The time per pixel and pulse depends on the machine, on its load, and on whether kernels are compiled. It is
-    therefore measured on a small and a larger image of the mission. If all images together certainly take less than a
-    minute, no time is measured, and the result is 0. It is also 0 if hardly any image can be formed.
+    therefore measured with a small and a larger image of the mission. If all images together certainly take less than
+    a minute, no time is measured, and the result is 0. The result is also 0 if hardly any image can be formed.
     """
     mission = mission._replace(places={})
     study = Study(mission, analysis)
@@ -283,12 +283,12 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1, analysis
 
 
 def _size(cells: int, range_cells: int) -> float:
-    """Cost of forming an image, the product of pixels and pulses, relative to the cost of the smallest image."""
+    """Cost of forming an image, as the product of pixels and pulses, relative to the cost of the smallest image."""
     return cells * range_cells * pulses_for(cells) / (CUT_CELLS * RANGE_CELLS * pulses_for(CUT_CELLS))
 
 
 def _seconds(study: Study, cells: int) -> float:
-    """Measure the time that it takes to form two error-free images and to read their phase over the aperture. [s]"""
+    """Measure the time to form an image pair without errors, and to measure the phase over the aperture in it. [s]"""
     errors, start_time = Errors(), time.perf_counter()
     effect = study.collection.effect(errors)
     chips = study.collection.pair(errors, effect.displacement, cells)
@@ -301,7 +301,7 @@ def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[Im
     """Form the images that a report shows for the most important rows of a verified mission.
 
     The worst row comes first. The result is empty if no row has an image. `findings` must contain the verdicts of the
-    images.
+    verification.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:
@@ -329,7 +329,7 @@ def _shown(images: Responses) -> PointImage:
 
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
-    """Convert a chip to the picture that a report shows: the smeared response with its sidelobes, and its cut.
+    """Convert a chip to the picture shown in a report: the smeared response with its sidelobes, and a cut through it.
 
     `smear_cells` is the length of the smear in resolution cells.
     """

@@ -1,4 +1,4 @@
-"""Verification of the limits on quadratic phase with and without autofocus, on cubic phase, and on location."""
+"""Verification of the limits on quadratic phase (with and without autofocus), cubic phase, and location error."""
 
 import math
 
@@ -29,10 +29,10 @@ _MAX_SMEAR_CELLS = 64  # with a longer smear, images are formed only at the limi
 
 
 def quadratic(study: Study, source: ErrorSource) -> Verdict:
-    """Verify the limit that the quadratic phase sets on the size of one error, with and without autofocus.
+    """Verify the limit that the quadratic phase sets on the size of an error, with and without autofocus.
 
-    If the quadratic phase of the error never reaches the budget, the limit that the cubic phase or the location sets
-    is verified instead.
+    If the quadratic phase of the error never reaches the budget, the limit that is set by its cubic phase or by its
+    displacement is verified instead.
     """
     budget, gain = study.allocation.qpe_limit(source.owner), study.allocation.autofocus_gain
     boundary = study.boundary(source, budget)
@@ -47,12 +47,11 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
 
 
 def slow_vibration(study: Study, vibration: Subject) -> Verdict:
-    """Verify the limit on the quadratic phase of a vibration with less than one cycle per aperture.
+    """Verify the limit that is set by the quadratic phase of a vibration with less than one cycle per aperture.
 
-    An image is formed for each axis, with vibration along only this axis and with the worst starting phase. The
+    An image is formed for each axis, with vibration only along this axis and with the worst starting phase. The
     phases measured in these images are added. For a vibration along several axes, the amplitudes are scaled until the
-    sum of
-    the phases computed from exact ranges reaches the limit.
+    sum of the phases computed from exact ranges reaches the limit.
     """
     name, entry, budget = vibration.owner, vibration.entry or 0, study.allocation.qpe_limit(vibration.owner)
     mission, tone = study.mission, study.analysis.slow_tones[vibration.id]
@@ -86,9 +85,10 @@ def slow_vibration(study: Study, vibration: Subject) -> Verdict:
 
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
-    """Return a vibration with the starting phase that lowers the peak most, as computed from exact ranges.
+    """Return a vibration with the starting phase that reduces the peak of the response most.
 
-    `name` is the vibrating platform, and `line` the vibration with any starting phase.
+    The reduction of the peak is computed from exact ranges. `name` is the vibrating platform, and `line` is the
+    vibration with an arbitrary starting phase.
     """
     lines = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
     candidates = [Errors().of(name, PathError(sinusoids=(shifted,))) for shifted in lines]
@@ -96,7 +96,7 @@ def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
-    """Verify the limit that the cubic phase or the location sets on an error without a limit on quadratic phase."""
+    """Verify the limit on an error if its cubic phase or its displacement sets the limit, not its quadratic phase."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
     blank = study.blank(source.id, size, source.unit)
@@ -128,7 +128,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 
 
 def total(study: Study, row_id: str, owner: str) -> Verdict:
-    """Verify the limit on the sum of the quadratic phases of all declared errors of an owner.
+    """Verify the limit on the sum of the quadratic phases of all declared errors of an owner, such as a platform.
 
     The signs of the errors are chosen so that their phases add. The verdict is `not_evaluated` if
     `allocation.combine` is not `sum`, or if the errors have no quadratic phase.
@@ -144,20 +144,23 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 
 
 def other(study: Study, source: ErrorSource) -> Verdict:
-    """Return the verdict `not_evaluated` for an error that the file states as a phase and not as a motion."""
+    """Return the verdict `not_evaluated` for an error that the mission file states as a phase and not as a motion."""
     budget = study.allocation.qpe_limit(source.owner)
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=phrases.note("phase-without-motion"))
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Return the verdict `not_evaluated` for an `other` error that the file does not state as a quadratic phase."""
+    """Return the verdict `not_evaluated` for an error that the mission file states by its effect.
+
+    Such an effect is, for example, an ISLR or a displacement, but not a quadratic phase.
+    """
     return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
 
 def dispersion(study: Study) -> Verdict:
-    """Return the verdict `not_evaluated` for dispersion, the phase that free electrons cause over the band.
+    """Return the verdict `not_evaluated` for dispersion, which is the phase over the band due to free electrons.
 
-    Phases of images are measured over slow time, so the images cannot show dispersion.
+    The phase of an image is measured over slow time, so the images cannot show dispersion.
     """
     budget = study.allocation.qpe_total
     blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
@@ -167,7 +170,7 @@ def dispersion(study: Study) -> Verdict:
 def edge(study: Study) -> Verdict:
     """Return the verdict `not_evaluated` for the phase difference between the centre and the edge of the scene.
 
-    The images show only the scene centre. Only the tests of the package compare this difference with images.
+    The images show only the scene centre. This difference is compared with images only in the tests of the package.
     """
     budget = study.allocation.qpe_total
     blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
@@ -177,7 +180,8 @@ def edge(study: Study) -> Verdict:
 def cubic(study: Study, requirement: float) -> Verdict:
     """Verify the limit on the cubic phase of all declared errors together.
 
-    The errors are scaled until their cubic phase by the gating model reaches `requirement`. [rad]
+    The errors are scaled by a common factor until their cubic phase, computed by the model that decides the verdict,
+    reaches `requirement` [rad].
     """
     blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -200,10 +204,10 @@ def cubic(study: Study, requirement: float) -> Verdict:
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
-    """Verify autofocus at its pull-in limit, in the image of a clock error with a quadratic phase of π·N_pull.
+    """Verify autofocus at its pull-in limit, with an image of a clock error that has a quadratic phase of π·N_pull.
 
-    N_pull is the pull-in range `autofocus.n_pull`. A clock error is used because it does not change the geometry.
-    Range walk limits N_pull.
+    N_pull is the pull-in range `autofocus.n_pull`, which is limited by range walk. A clock error is used because it
+    does not change the geometry.
     """
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # range error λN/2 divided by the range cell c/B
@@ -216,12 +220,12 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
 
 
 def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool = True) -> VerdictFields:
-    """Refocus an image with errors at their limit, and compare the phase that autofocus leaves with the budget.
+    """Refocus an image with errors at their limit, and compare the phase left by autofocus with the budget.
 
-    `budget` is the limit on the quadratic phase without autofocus gain. [rad] If `holds_hidden`, the remaining phase
-    includes the hidden phase, which autofocus cannot estimate because the band and the turn of the line of sight do
-    not resolve it. The hidden phase is left out if only the pull-in range is verified, because it is part of the
-    verdicts on other rows. Returns the fields of the verdict that concern autofocus.
+    `budget` [rad] is the limit on the quadratic phase without autofocus gain. If `holds_hidden` is true, the
+    remaining phase includes the hidden phase, which autofocus cannot estimate because the band and the turn of the
+    line of sight do not resolve it. To verify only the pull-in range, the hidden phase is left out, because it is
+    part of the verdicts on other rows. Returns the fields of the verdict that concern autofocus.
     """
     try:
         errors = study.together(sizes, study.worse_sign(sizes))
@@ -284,8 +288,8 @@ def predicted(effect: ExactEffect) -> VerdictFields:
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     """Return the verdict on a limit at which no image can be formed.
 
-    `error` states why no image can be formed. A limit of the published model is optimistic if no ground point has the
-    recorded range history. Otherwise the verdict is `not_evaluated`.
+    `error` contains the reason. If no ground point has the recorded range history, a limit of the published model is
+    `optimistic`. Otherwise the verdict is `not_evaluated`.
     """
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(verdict="optimistic", reason=phrases.note("no-image-at-the-limit"))
@@ -305,9 +309,9 @@ def compare(excess: float, tolerance: float) -> str:
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement (east, north) that several errors together cause by (25) of the paper. [m]
+    """Displacement (east, north) due to several errors together, by equation (25) of the paper. [m]
 
-    `scale` multiplies the sizes of the errors. The result is None if (25) has no solution.
+    `scale` multiplies the sizes of the errors. The result is None if equation (25) has no solution.
     """
     published = study.analysis.published  # (25)
     moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
@@ -319,7 +323,7 @@ def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVe
 def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     """Return the verdict on a quadratic-phase limit from images with errors below, at and above the limit.
 
-    `sizes` are the errors with their sizes at the limit. The phases measured in the images are compared with the
+    `sizes` holds the errors with their sizes at the limit. The phases measured in the images are compared with the
     budget in `blank`. If the smear is long, only the image at the limit is formed.
     """
     budget = blank.budget_rad or 0.0
@@ -360,11 +364,11 @@ def _through_the_limit(
 ) -> tuple[str, Note | None]:
     """Return the verdict on a limit from measured phases, and a note if the phase does not grow with the error.
 
-    `inside`, `measured` and `beyond` are the phases with the error below, at and above its limit. [rad] `inside` and
+    `inside`, `measured` and `beyond` [rad] are the phases with the error below, at and above its limit. `inside` and
     `beyond` are None if no image is formed at these sizes. A limit is correct only if smaller errors have smaller
-    phases. If the phase below the limit is as large as the phase at the limit or larger, the verdict follows from the
-    phase below the limit, without a tolerance. Above the limit the phase may fall. In this case the verdict does not
-    change. The note is None if the phase grows.
+    phases. If the phase below the limit is at least as large as the phase at the limit, the verdict is based on the
+    phase below the limit, without a tolerance. A smaller phase above the limit does not change the verdict. The note
+    is None if the phase grows.
     """
     verdict = compare(measured / budget - 1, TOLERANCE_FRACTION)
     falls_inside = inside is not None and inside >= measured
@@ -381,9 +385,10 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Return the fields of a verdict that describe a response: displacement, smear, and cross-range response.
+    """Return the fields of a verdict that describe a response: displacement, smear, and measures of its cut.
 
-    Quantities that are undefined, because the smear is long or the patch is curved, are omitted.
+    The cut is across range. Quantities that cannot be determined, because the smear is long or the patch is curved,
+    are omitted.
     """
     chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
@@ -409,7 +414,8 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> V
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
     """Measure the equal-loss quadratic phase in an image that contains several errors. [rad]
 
-    `scale` multiplies the sizes of the errors. The result is None if no image can be formed or read.
+    `scale` multiplies the sizes of the errors. The result is None if the image cannot be formed or its phase cannot
+    be measured.
     """
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
@@ -419,14 +425,15 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
-    """Find the factor for all errors at which their cubic phase from exact ranges equals the requirement.
+    """Find the common factor of all errors for which their cubic phase from exact ranges equals the requirement.
 
     `scale` is a first guess of the factor.
 
     Raises
     ------
     ValueError
-        No factor is found: the cubic phase never equals the requirement, or only where no image can be formed.
+        No such factor is found: the cubic phase never equals the requirement, or only for a factor with which no
+        image can be formed.
     """
     low, high = 0.0, math.inf  # scale with too little phase, and scale with too much phase or without an image
     for _ in range(60):
@@ -444,13 +451,13 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
 
 # ---------------------------------------------------------------------- location
 def location(study: Study, requirement: float) -> Verdict:
-    """Verify the location limit with one image that contains all declared errors.
+    """Verify the limit on location error with an image that contains all declared errors.
 
-    The errors are scaled by a common factor, so that their displacement by the gating model equals `requirement`. [m]
-    The limit is confirmed if the displacement in the image agrees with the gating model within 5 % of the
-    requirement. For the published model (25), the displacement by each single error must also agree with exact
-    ranges. The limit is conservative if (25) disagrees only by displacements that are too long. Any other limit that
-    is not confirmed is optimistic.
+    The errors are scaled by a common factor so that the displacement computed by the gating model, which decides the
+    verdict, equals `requirement` [m]. The limit is confirmed if the displacement in the image agrees with the gating
+    model within 5 % of the requirement. For the published model, which uses equation (25), the displacement due to
+    each single error must also agree with exact ranges. If some displacements disagree, and equation (25) makes all
+    of these too long, the limit is conservative. In the remaining cases it is optimistic.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -506,10 +513,10 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Find the factor for all errors at which their displacement by the gating model equals the requirement.
+    """Find the common factor of all errors for which their displacement by the gating model equals the requirement.
 
-    The result is None if the errors together do not displace the image, or if (25) has no solution in the published
-    model.
+    The result is None if the errors together do not displace the image, or if the gating model, which decides the
+    verdict, is the published model and equation (25) has no solution.
     """
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)
@@ -530,7 +537,7 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
 
 
 def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundVector:
-    """Distances along x′ and along y′ between the displacements `a` and `b` (east, north). [m]"""
+    """Absolute differences along x′ and along y′ between the displacements `a` and `b` (east, north). [m]"""
     look = study.geometry.look_azimuth
     cosine, sine = math.cos(look), math.sin(look)
     east, north = b[0] - a[0], b[1] - a[1]
@@ -538,12 +545,12 @@ def _along_and_across(study: Study, a: GroundVector, b: GroundVector) -> GroundV
 
 
 def _is_shorter(expected: GroundVector, actual: GroundVector) -> bool:
-    """Whether sums of displacements such as `actual` cannot be longer than sums of the expected displacements.
+    """Whether sums of displacements like `actual` are never longer than sums of displacements like `expected`.
 
     If the signs of several displacements are chosen to maximise the length of their sum, this length is at least 2/π
-    times the sum of their lengths. A component across the expected direction is therefore harmless if it is at
-    most 2/π times the amount by which the component along this direction falls short of the expected length. The
-    result is False if the expected displacement is zero.
+    times the sum of their lengths. The component of `actual` perpendicular to `expected` is therefore harmless if it
+    is at most 2/π times a difference of lengths: the length of `expected` minus the component of `actual` along it.
+    The result is False if `expected` is zero.
     """
     length = math.hypot(*expected)
     if not length:

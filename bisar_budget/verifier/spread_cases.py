@@ -1,14 +1,14 @@
 """Verdicts on the limits of vibration and of random errors of sensors, clocks and the atmosphere.
 
 The standard deviation (sigma) of an effect describes many flights. It is measured from random time series of the
-error, whose effects follow from exact ranges. For a few of the series, images show whether a response has the phase
-that exact ranges give.
+error, whose effects are computed from exact ranges. For a few of the series, images are used to check whether the
+phase of a response agrees with exact ranges.
 
-The power that errors spread (ISLR) is measured in as many random images as the verdict needs. Each image is a cut
-across range: the Fourier transform of the phasor over the aperture under its window. Because the aperture is sampled,
-the image repeats. The mainlobe lies within the first nulls of the error-free response, and the sidelobes fill the
-remainder of one repeat interval. By Parseval's theorem, only the mainlobe has to be transformed. Energies are means
-over the draws.
+The power that errors spread over the image (ISLR) is measured in as many random images as the verdict needs. Each
+image is a cut across range: the Fourier transform of the phasor over the aperture, weighted by its window. Because
+the aperture is sampled, the image repeats. The mainlobe is between the first nulls of the error-free response, and
+the sidelobes fill the remainder of one repeat interval. By Parseval's theorem, only the mainlobe has to be
+transformed. Energies are means over the draws.
 """
 
 import math
@@ -106,10 +106,10 @@ Case = Callable[[], Verdict]
 
 # ---------------------------------------------------------------------- vibration
 def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield the row subject of each limit on echoes and noise of vibration, and a function that verifies the limit.
+    """Yield each limit on echoes or noise of vibration: the subject of its row, and a function that verifies it.
 
-    There are limits for each platform alone, and for both platforms together. Vibrations below one cycle per aperture
-    are verified in `phase_cases`.
+    There are limits for each platform alone, and for both platforms together. Vibrations with less than one cycle per
+    aperture are verified in `phase_cases`.
 
     With the published limits and equal shares of both platforms, the echoes of a sinusoidal vibration of one platform
     are 9 dB below the requirement. If both platforms vibrate in phase, the echoes are 3 dB below the requirement.
@@ -168,10 +168,10 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Verdict on a sinusoidal vibration at its limit, whose paired echo is compared with the requirement.
+    """Verdict on a sinusoidal vibration at its limit: compare its paired echo with the requirement.
 
     The error-free image is subtracted before the echo is measured, because its sidelobes would mask the echo.
-    `limits` are the amplitudes at the limit, by platform. [m] `declared` is the declared frequency. [Hz] If it is
+    `limits` maps platforms to their amplitudes [m] at the limit. `declared` [Hz] is the declared frequency. If it is
     None, the vibration has 10 cycles per aperture.
     """
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
@@ -181,10 +181,11 @@ def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], decla
 
 
 def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
-    """Verdict on a group of vibration tones of neighbouring frequencies, scaled together to their common limit.
+    """Verdict on a group of vibration tones with neighbouring frequencies at their common limit.
 
-    The amplitudes keep their declared ratios. The starting phases of the tones are chosen to give the highest echo.
-    `name` is the platform. `limit` is the amplitude of a single tone with the same echo. [m]
+    The amplitudes are scaled by a common factor, so that their declared ratios are kept. The starting phases of the
+    tones are chosen to give the highest echo. `name` is the platform. `limit` is the amplitude of a single tone with
+    the same echo. [m]
     """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
@@ -208,10 +209,10 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Verdict on sinusoidal platform motions, whose paired echoes are compared with the requirement in `blank`.
+    """Verdict on sinusoidal platform motions: compare their paired echoes with the requirement in `blank`.
 
-    `sinusoids` are the motions by platform. `who` describes them in the reason of the verdict. `is_assumed` tells
-    whether their frequency is assumed because the mission file does not state it.
+    `sinusoids` maps platforms to their motions. `who` describes the motions in the reason for the verdict.
+    `is_assumed` is true if their frequency is an assumption because the mission file does not state it.
     """
     collection = study.collection
     cycles_of_all = [
@@ -243,10 +244,10 @@ def echo(
 
 
 def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verdict:
-    """Verdict on a noise-like vibration at its limit, from the ISLR that white noise adds.
+    """Verdict on a noise-like vibration at its limit: compare the ISLR added by white noise with the requirement.
 
-    The ISLR is measured over one repeat interval of the image, in as many draws as the verdict needs. `limits` are
-    the rms displacements at the limit, by platform. [m]
+    The ISLR is measured over one repeat interval of the image, with as many draws as the verdict needs. `limits` maps
+    platforms to their rms displacements at the limit. [m]
     """
     collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
     slow_time = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
@@ -286,9 +287,9 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
 def measured_power(
     collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], basis: Note
 ) -> Verdict:
-    """Verdict on the ISLR that random phases add, compared with the requirement in `blank`.
+    """Verdict on random phases: compare the ISLR that they add with the requirement in `blank`.
 
-    `draw` takes a number of draws and returns random phases over the aperture, (draws, _ISLR_SAMPLES). [rad] `basis`
+    `draw` takes a number of draws and returns random phases [rad] over the aperture, (draws, _ISLR_SAMPLES). `basis`
     is the beginning of the reason for the verdict.
     """
     required = blank.requirement_db or 0.0
@@ -320,14 +321,17 @@ def limits_of(study: Study, error: RandomError) -> dict[str, float]:
 
 
 def _model(study: Study, error: RandomError) -> str:
-    """Name of the gating model in which a random error has the larger phase, quadratic or cubic."""
+    """Name of the model that gives the larger phase (quadratic or cubic) for a random error.
+
+    Only models that decide the mission's status are compared.
+    """
     return max((model.name for model in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
 def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield the row subject of each oscillator tone that has a limit, and a function that verifies the limit.
+    """Yield each oscillator tone with a limit: the subject of its row, and a function that verifies the limit.
 
-    In an image the tone is represented by a motion of its platform that causes the same phase.
+    In images the tone is represented by a platform motion that causes the same phase.
     """
     mission, wavelength = study.mission, study.collection.wavelength
     metric, limits = tone_limits(mission, study.allocation)
@@ -355,20 +359,20 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
-    """Verdict on a tone at the limit that the requirement on ISLR sets.
+    """Verdict on a tone at the limit that is set by the ISLR requirement.
 
-    The tone is a motion of the platform `owner`. It has the amplitude `amplitude` [m] and the number `cycles` of
-    cycles per aperture.
+    The tone is represented by a motion of the platform `owner` with the amplitude `amplitude` [m] and `cycles` cycles
+    per aperture.
     """
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
 
 
 def verify_pslr(study: Study) -> Verdict:
-    """Verdict on the PSLR requirement, from the declared tones that together produce the highest echo.
+    """Verdict on the PSLR requirement: measure the highest echo that declared tones produce together.
 
     The starting phases of the tones are chosen to give the highest echo. The tones are scaled by a common factor, so
-    that the echo has the required PSLR.
+    that their predicted echo has exactly the required PSLR.
     """
     required = study.mission.requirements.pslr or 0.0
     row_id = subject("mission", "pslr").id
@@ -388,9 +392,9 @@ def verify_pslr(study: Study) -> Verdict:
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Verdict on the limit of a random error, which is the smallest of the sizes that the requirements allow.
+    """Verdict on the limit of a random error.
 
-    The limit does not include the gain of autofocus.
+    The limit is the smallest size at which the error reaches any requirement. It does not include the autofocus gain.
     """
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
@@ -406,10 +410,10 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
 
 
 def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
-    """Verdict on the quadratic or cubic phase that a random error causes at its limit.
+    """Verdict on the quadratic or cubic phase of a random error at its limit.
 
-    The sigma of the phase, times the coverage factor, is compared with the budget. `binding` is the requirement that
-    sets the limit.
+    The standard deviation of the phase, multiplied by the coverage factor, is compared with the budget. `binding` is
+    the requirement that sets the limit.
     """
     is_cubic = binding == CUBIC
     required = study.mission.requirements.cubic_phase_error
@@ -441,9 +445,9 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
 
 
 def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
-    """Verdict on the displacement that a random error causes at the limit set by the location requirement.
+    """Verdict on the displacement due to a random error at the limit that is set by the location requirement.
 
-    The sigma of the displacement, times the coverage factor, is compared with the requirement.
+    The standard deviation of the displacement, multiplied by the coverage factor, is compared with the requirement.
     """
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _SIGMA_DRAWS
@@ -482,14 +486,14 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
-    """Random number generator for a row, with a seed made from the mission's seed and the id of the row."""
+    """Random number generator for a row, seeded with the mission's seed and the id of the row."""
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of the quadratic or cubic phase over many time series [rad], and the number of time series.
+    """Standard deviation of the quadratic or cubic phase over many time series [rad], and the number of series.
 
-    Time series for which no ground point has the range history are left out.
+    Time series for which no ground point has the recorded range history are left out.
     """
     if error.kind.drawn_as in _EFFECTS_OF_DRAWS:
         effects = _EFFECTS_OF_DRAWS[error.kind.drawn_as](study, error, rng)
@@ -499,7 +503,7 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 
 def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Draw many motions of the platforms that a random error causes, and compute their effects from exact ranges.
+    """Draw many platform motions due to a random error, and compute their effects from exact ranges.
 
     The fields of the result are (draws,).
     """
@@ -510,7 +514,7 @@ def _effects_of_motion(study: Study, error: RandomError, rng: np.random.Generato
 
 
 def _effects_of_delays(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
-    """Draw many delays in the atmosphere that a random error causes, and compute their effects from exact ranges.
+    """Draw many atmospheric delays due to a random error, and compute their effects from exact ranges.
 
     The fields of the result are (draws,).
     """
@@ -528,9 +532,9 @@ _EFFECTS_OF_DRAWS: Mapping[str, Callable[[Study, RandomError, np.random.Generato
 
 
 def _remaining_range_error(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
-    """Range error over the aperture that delays in the atmosphere leave at the displaced image point. [m]
+    """Range error over the aperture that atmospheric delays leave at the displaced image point. [m]
 
-    The result is (draws, times). `group` are the group delays, (draws, times). [m] `times` are slow times. [s]
+    The result is (draws, times). `group` (draws, times) [m] holds the group delays. `times` [s] are slow times.
     """
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
@@ -547,9 +551,9 @@ def _remaining_range_error(study: Study, error: RandomError, times: Floats, grou
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
-    """Draw time series of the phase of an oscillator or of the synchronisation link, and fit polynomials to them.
+    """Draw phases of an oscillator or of the synchronisation link over time, and fit polynomials to them.
 
-    Returns the Legendre coefficients over the aperture up to the cubic order, (4, draws) [rad], and the number of
+    Returns the Legendre coefficients up to the cubic order over the aperture, (4, draws) [rad], and the number of
     draws.
     """
     mission, T = study.mission, study.collection.aperture_time
@@ -570,9 +574,10 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
 
 
 def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Draw zenith delays, in units of the declared sigma, at the nodes of exact ranges, (draws, nodes).
+    """Draw zenith delays at the slow times for which exact ranges are computed, (draws, nodes).
 
-    For delays that are correlated over time, the result is their smooth part, see `_smooth_at_nodes`.
+    The delays are in units of the declared sigma. The times are the nodes of a quadrature. For delays that are
+    correlated over time, the result is their smooth part; see `_smooth_at_nodes`.
     """
     T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
     if correlation_time is None:
@@ -608,10 +613,10 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 
 
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
-    """Matrix that converts values at slow times to their smooth part at the nodes of exact ranges, (nodes, times).
+    """Matrix (nodes, times) that converts values at slow times to their smooth part at the nodes of exact ranges.
 
     The smooth part is a least-squares fit of Legendre polynomials up to the order `SMOOTH_ORDER`. Without this fit,
-    the phase of noise with a short correlation time would appear too large, because the nodes are far apart.
+    the phase of noise with a short correlation time would be overestimated, because the nodes are far apart.
     """
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
@@ -619,10 +624,10 @@ def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
-    """Ratio of the low-frequency power density of correlated noise to that of its samples.
+    """Ratio of the power density of correlated noise to the power density of its samples, at low frequencies.
 
-    Samples at time steps Δ have more power at low frequencies than the noise itself: Δ·coth(Δ/2τ_c) instead of 2τ_c,
-    where τ_c is the correlation time. [s]
+    Samples at time steps Δ have more power at low frequencies than the noise itself: their power density is
+    Δ·coth(Δ/2τ_c) instead of 2τ_c, where τ_c [s] is the correlation time.
     """
     step = float(times[1] - times[0])
     return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
@@ -635,7 +640,7 @@ def _moments(study: Study, count: int) -> Floats:
 
 
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
-    """Draw a few time series of a random error, as errors that the simulator applies to images.
+    """Draw a few time series of a random error, and convert them to errors that the simulator applies to images.
 
     Only Legendre orders up to the cubic are kept, because higher orders spread power and would mask the response.
     """
@@ -678,10 +683,10 @@ _IMAGE_ERRORS: Mapping[str, Callable[[Study, RandomError, Floats, np.random.Gene
 
 # ---------------------------------------------------------------------- what spreads
 def verify_islr(study: Study, row_subject: Subject) -> Verdict:
-    """Verdict on the ISLR limit of an owner, from all declared errors of the owner that spread power.
+    """Verdict on the ISLR limit of an owner, such as a platform, for all declared errors of the owner.
 
-    The errors are scaled together until their power equals the limit. `row_subject` is the subject of the row, which
-    names the owner.
+    Only errors that spread power are included. They are scaled by a common factor until their power equals the limit.
+    `row_subject` is the subject of the row, which names the owner.
     """
     mission, model = study.mission, study.models[-1].name
     limit = spread_limit(mission, study.allocation, row_subject.owner, model) or 0.0
@@ -715,12 +720,12 @@ def _power(
     cubic: float = 0.0,
     order: int = _CUBIC_ORDER,
 ) -> Verdict:
-    """Verdict on errors at a limit: the ISLR that they add to an image is compared with the share of `owner`.
+    """Verdict on errors at a limit: compare the ISLR that they add to an image with the ISLR allotted to `owner`.
 
-    `members` are random errors, each drawn as time series. `white` is the rms phase of additional white noise.
-    [rad] Legendre orders up to `order` are removed from the time series and from the noise. `echoes` are tones, each
-    given by its rms phase [rad] and its number of cycles per aperture; their starting phases are random. `cubic` is
-    the rms of a random cubic phase over the aperture. [rad]
+    `members` holds random errors, which are drawn as time series. `white` [rad] is the rms phase of additional white
+    noise. Legendre orders up to `order` are removed from the time series and from the noise. `echoes` holds tones,
+    each given by its rms phase [rad] and its number of cycles per aperture; their starting phases are random. `cubic`
+    [rad] is the rms value of a random cubic phase over the aperture.
     """
     mission, collection = study.mission, study.collection
     rng = _stream(study, blank.id)
@@ -733,7 +738,7 @@ def _power(
     def draw_phases(draws: int) -> Floats:
         """Draw the phases of all errors over the aperture, (draws, _ISLR_SAMPLES). [rad]
 
-        Random errors and white noise are drawn without the orders that displace or defocus the response.
+        The Legendre orders that displace or defocus the response are removed from random errors and white noise.
         """
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
@@ -757,7 +762,7 @@ def _power(
 def _phases_of_motion(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Draw the motion of each platform, and yield the phase that its component along the line of sight causes. [rad]
+    """Draw the motion of each platform, and yield the phase due to the motion along the line of sight. [rad]
 
     Each array is (draws, times).
     """
@@ -768,9 +773,9 @@ def _phases_of_motion(
 def _phases_of_delays(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Draw delays in the atmosphere, and yield the phase that they leave at the displaced image point. [rad]
+    """Draw atmospheric delays, and yield the phase that they leave at the displaced image point. [rad]
 
-    A single array is yielded, (draws, times).
+    A single array of shape (draws, times) is yielded.
     """
     group = delay_courses(study.mission, error, times, draws, rng)
     yield 2 * math.pi / study.collection.wavelength * _remaining_range_error(study, error, times, group)
@@ -779,7 +784,7 @@ def _phases_of_delays(
 def _phases_of_clock(
     study: Study, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Yield random phases of an oscillator or of the synchronisation link in a single array, (draws, times). [rad]"""
+    """Yield random phases of an oscillator or of the synchronisation link, as a single array (draws, times). [rad]"""
     yield phase_courses(study.mission, error, times, draws, rng)
 
 
@@ -792,7 +797,7 @@ _PHASES_AT_MOMENTS: Mapping[
 # ---------------------------------------------------------------------- ISLR that noise adds
 @dataclass(frozen=True, slots=True)
 class AddedIslr:
-    """ISLR that noise adds, the ends of its 95 % confidence interval [dB], and the number of draws.
+    """ISLR that noise adds [dB], its 95 % confidence interval [dB], and the number of draws.
 
     `level` is the ISLR, and `low` and `high` are the ends of the interval.
     """
@@ -810,9 +815,9 @@ class AddedIslr:
     def verdict(self, required_db: float) -> str:
         """Verdict on a noise limit: compare the ISLR that noise at the limit adds with the required ISLR.
 
-        The verdict is `not_evaluated` if more draws may change it. If even the maximum number of draws does not
-        decide between `confirmed` and `conservative`, the verdict is `conservative`, because the noise does not add
-        too much ISLR in either case.
+        The verdict is `not_evaluated` if more draws could change it. If even the maximum number of draws cannot
+        decide between `confirmed` and `conservative`, the verdict is `conservative`, because in either case the added
+        ISLR is not too high.
         """
         excess, doubt = self.level - required_db, _DECISION_SIGMA * self.error
         low, high = excess - doubt, excess + doubt
@@ -826,12 +831,12 @@ class AddedIslr:
 
 
 class Mainlobe:
-    """Mainlobe of an error-free response, which lies between the first nulls of the response.
+    """Mainlobe of an error-free response, between the first nulls of the response.
 
     Parameters
     ----------
     weights : (moments,) ndarray
-        Window over the aperture, at the centres of equal cells.
+        Window weights over the aperture, at the centres of equal cells.
     """
 
     def __init__(self, weights: Floats) -> None:
@@ -848,7 +853,7 @@ class Mainlobe:
     def lost(self, phases: Floats) -> Floats:
         """Energy that phase errors remove from the mainlobe, as a fraction of the energy of the image, (draws,).
 
-        `phases` are the phase errors at the centres of the cells of the window, (draws, moments). [rad]
+        `phases` holds the phase errors at the centres of the cells of the window, (draws, moments). [rad]
         """
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
@@ -856,7 +861,7 @@ class Mainlobe:
         return energy_loss
 
     def added_db(self, lost: float) -> float:
-        """Increase of the ISLR if errors move the fraction `lost` of the image energy to sidelobes. [dB]"""
+        """Increase of the ISLR if a fraction `lost` of the image energy moves from mainlobe to sidelobes. [dB]"""
         remaining_energy = max(self.energy - lost, _MIN_ENERGY_FRACTION)
         return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))
 
@@ -864,17 +869,17 @@ class Mainlobe:
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
     """Measure the ISLR that random phases add, with as many draws as the verdict needs.
 
-    Drawing stops when the confidence interval is narrow and lies within the range of a single verdict, or when the
-    maximum number of draws is reached.
+    Drawing stops when the confidence interval is narrow and within the range of a single verdict, or when the maximum
+    number of draws is reached.
 
     Parameters
     ----------
     weights : (moments,) ndarray
-        Window over the aperture.
+        Window weights over the aperture.
     draw : callable
-        Takes a number of draws and returns phases, (draws, moments). [rad]
+        Function that takes a number of draws and returns random phases, (draws, moments). [rad]
     required_db : float
-        ISLR that may be added.
+        Largest ISLR that may be added. [dB]
     """
     mainlobe = Mainlobe(weights)
     lost: Floats = np.empty(0)

@@ -1,4 +1,4 @@
-"""Study of one mission: its analysis, its simulated collection, and the images by which limits are verified."""
+"""Study of one mission: its analysis, its simulated collection, and the images with which limits are verified."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -54,10 +54,11 @@ _MIN_DOPPLER_RATE_FRACTION = 0.02  # of the highest Doppler rate; lower rates ar
 
 
 class Spread(NamedTuple):
-    """Extent of a smeared response: smear along the line of equal range, and range walk across it. [resolution cells]
+    """Extent of a smeared response: smear along the line of equal range, and range walk across it.
 
-    `is_round` marks an aperture within which Doppler reverses. The response then spreads in all directions, and
-    `smear` and `walk` are equal. A range cell has `finer` times as many pixels as a cross-range cell.
+    Both are in resolution cells. `is_round` is true if Doppler reverses within the aperture. The response then
+    spreads in all directions, and `smear` and `walk` are equal. A range cell has `finer` times as many pixels as a
+    cross-range cell.
     """
 
     smear: int
@@ -67,11 +68,11 @@ class Spread(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Image of a point with errors and image of an error-free point, around the same ground point.
+    """Image of a point with errors, and image of an error-free point, around the same ground point.
 
     `chip` is the image with errors, in which the scene centre is displaced. `reference` is the error-free image of a
-    point at this displaced position. Both are images around the displaced position. `effect` is the effect of the
-    errors from exact ranges, and `spread` is the extent of the response.
+    point at this displaced position, which is the centre of both images. `effect` is the effect of the errors
+    computed from exact ranges, and `spread` is the extent of the response.
     """
 
     errors: Errors
@@ -86,7 +87,7 @@ VerdictFields = dict[str, Any]
 
 
 class Study:
-    """One mission, with the analysis and the simulated collection that the verdicts on all rows share."""
+    """One mission, with the analysis and the simulated collection on which the verdicts on all rows are based."""
 
     def __init__(self, mission: Mission, analysis: Analysis | None = None) -> None:
         self.mission, self.analysis = mission, analysis or Analysis(mission)
@@ -96,40 +97,44 @@ class Study:
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
-        """Create a verdict, still without measurements, on a limit of the gating model.
+        """Create a verdict on a limit, in which the measurements are still missing.
 
-        `limit` is in `unit`. `fields` are additional fields of the verdict.
+        The limit is that of the model that decides the mission's status. `limit` is in `unit`. `fields` are
+        additional fields of the verdict.
         """
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
 
     @property
     def is_full(self) -> bool:
-        """Whether the gating model computes displacement and cubic phase from exact ranges.
+        """Whether the model that decides the status computes displacement and cubic phase from exact ranges.
 
-        Otherwise it computes them by (25) and Table I of Rigling & Moses.
+        Otherwise it computes them by equation (25) and Table I of Rigling & Moses.
         """
         return self.model != "published"
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Gating models of the mission, whose limits are verified: one model, or both models under `strictest`."""
+        """Models whose limits are verified: the model that decides the status, or both models for `strictest`."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that a simulated image can contain.
 
-        `other` errors are phases without a motion and are not included.
+        Errors of the kind `other`, which are phases without a motion, are not included.
         """
         return [s for s in self.analysis.stated if s.declared and s.displaces]
 
     def members(self, owner: str) -> list[ErrorSource]:
-        """Declared errors that count against an owner's budget for the quadratic phase."""
+        """Declared errors that count towards the quadratic-phase budget of an owner, such as a platform."""
         return [s for s in self.declared if self.allocation.qpe.includes(s.owner, owner)]
 
     @cached_property
     def unfocused_models(self) -> tuple[Model, ...]:
-        """Gating models of the mission with autofocus switched off, so that no phase includes autofocus gain."""
+        """Models that decide the mission's status, but with autofocus switched off.
+
+        Their limits do not include the autofocus gain.
+        """
         if self.allocation.autofocus_gain == 1:
             return self.models
         unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))
@@ -137,10 +142,10 @@ class Study:
         return tuple(getattr(analysis, name) for name in analysis.gates)
 
     def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
-        """Smallest size at which an error reaches a limit on the quadratic phase in any of the gating models.
+        """Smallest size at which an error's quadratic phase reaches a limit in any model that decides the status.
 
-        The size is in the unit of the error. It is None if the error never reaches the limit. `limit` is the largest
-        permitted quadratic phase. [rad] `is_focused` tells whether this limit includes the autofocus gain.
+        The size is in the unit of the error. It is None if the error never reaches the limit. `limit` [rad] is the
+        largest permitted quadratic phase. `is_focused` is true if this limit includes the autofocus gain.
         """
         models = self.models if is_focused else self.unfocused_models
         sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
@@ -149,7 +154,7 @@ class Study:
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
         """Allowable size of an error under all requirements, and the name of the requirement that sets it.
 
-        The size includes the autofocus gain. Both are None if no requirement limits the error.
+        The size includes the autofocus gain. Both results are None if no requirement limits the error.
         """
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
@@ -158,24 +163,24 @@ class Study:
         return min(allowables, key=lambda allowable: math.inf if allowable[0] is None else allowable[0])
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
-        """Convert one error with a size in its own unit to the errors that the simulator applies to an image."""
+        """Convert an error of a given size, in its own unit, to the errors that the simulator applies to an image."""
         return flown(source, size, self.geometry, self.collection.aperture_time)
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
-        """Combine several errors, each with `scale` times its size, into errors that the simulator applies."""
+        """Combine several errors, each with its size times `scale`, into the errors that the simulator applies."""
         scaled = ((source, scale * size) for source, size in sizes)
         return flown_together(scaled, self.geometry, self.collection.aperture_time)
 
     def effect(self, sizes: Sizes, scale: float = 1.0) -> ExactEffect:
-        """Compute from exact ranges the effect of several errors together, each with `scale` times its size."""
+        """Compute from exact ranges the joint effect of several errors, each with its size times `scale`."""
         return self.collection.effect(self.together(sizes, scale))
 
     def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
-        """Compute from exact ranges the effects of many errors that vary in any way over the aperture.
+        """Compute from exact ranges the effects of many errors that are arbitrary functions of slow time.
 
         `courses` maps the name of a platform to its motion errors, (draws, nodes, 3) [m], and "clock" to range
-        errors, (draws, nodes) [m]. `aperture_nodes` gives the slow times of the nodes. The fields of the result are
-        (draws,). They are NaN for a draw if no ground point has its range history.
+        errors, (draws, nodes) [m]. The slow times of the nodes are given by `aperture_nodes`. The fields of the
+        result are (draws,). They are NaN for a draw if no ground point has its range history.
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
@@ -185,12 +190,12 @@ class Study:
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:
-        """Sign of the errors, 1 or -1, that gives the larger equal-loss quadratic phase.
+        """Sign of the errors, 1 or -1, for which the equal-loss quadratic phase is larger.
 
         Raises
         ------
         ValueError
-            No ground point has the range history with either sign.
+            No ground point has the recorded range history with either sign.
         """
         phases = {}
         for sign in (1.0, -1.0):
@@ -203,10 +208,11 @@ class Study:
         return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
-        """Scale declared errors until the sum of their quadratic phases in the gating model equals a budget [rad].
+        """Scale declared errors until the sum of their quadratic phases equals a budget. [rad]
 
-        Returns pairs of an error and its scaled size. The signs of the sizes are chosen so that the phases add. The
-        list is empty if no error has a quadratic phase.
+        The phases are computed by the model that decides the mission's status. Returns pairs of an error and its
+        scaled size. The signs of the sizes are chosen so that the phases add. The list is empty if no error has a
+        quadratic phase.
         """
         model = self.models[-1]
 
@@ -232,7 +238,7 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Equal-loss quadratic phase that an error with the worse of its two signs has in a model. [rad]
+        """Equal-loss quadratic phase of an error in a model, for the sign of the error with the larger phase. [rad]
 
         The result has the sign of the quadratic phase of a small error. It is infinite if the phase is not finite.
         """
@@ -240,10 +246,10 @@ class Study:
         return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
 
     def at_limit(self, subject: Subject, limit: float, room: float = 1.0) -> Responses:
-        """Form the images for the errors of a row at its quadratic-phase limit, with the worse sign of the errors.
+        """Form the images with the errors of a row at its quadratic-phase limit, for the worse sign of the errors.
 
         For the row of a single error, `limit` is the size of the error. For the row of a sum of errors, `limit` is
-        the budget for the sum of their phases. [rad] `room` is described in `images`.
+        the budget [rad] for the sum of their phases. `room` is described in `images`.
         """
         source = next((s for s in self.sources if s.subject == subject), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(subject.owner), limit)
@@ -253,7 +259,7 @@ class Study:
         """Form the images of a point with errors and of an error-free point, on patches large enough for the smear.
 
         `room` is the minimum ratio of the width of a patch to the length of the smear; autofocus fails in a narrower
-        patch. `range_cells` is the height of a patch without range walk, in range cells.
+        patch. `range_cells` is the height of the patch in range cells if there is no range walk.
 
         Raises
         ------
@@ -270,7 +276,7 @@ class Study:
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
         """Measure the quadratic and cubic phase over the aperture in an image with errors. [rad]
 
-        `is_focused` tells whether autofocus has been applied to the image.
+        `is_focused` is true if autofocus has been applied to the image.
         """
         spread = images.spread
         cells = spread.walk + (_ROUND_CELLS if spread.is_round else READ_CELLS if spread.walk else 0)
@@ -287,16 +293,18 @@ class Study:
     def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
         """Measure the equal-loss quadratic phase of an image. [rad]
 
-        It is the purely quadratic phase that would cause the same loss of the peak as the errors in the image. The
-        part of the loss that the cubic phase and higher orders cause is not included.
+        It is the purely quadratic phase that would reduce the peak as much as the errors in the image do, apart from
+        the loss due to the cubic phase and higher orders.
 
-        If the hidden phase is small, the result is the root-sum-square of two phases: the quadratic phase measured
-        over the aperture, and the hidden phase from exact ranges. The same applies if the loss is more than about
-        3 dB, because the image then has no single peak.
+        The hidden phase is the part of the phase that the bandwidth and the turn of the line of sight do not resolve.
+        If it is small, or if the loss is more than about 3 dB so that the image has no single peak, the result is the
+        root-sum-square of two phases: the quadratic phase measured over the aperture, and the hidden phase computed
+        from exact ranges.
 
-        Otherwise the result follows from the measured loss of the peak. This loss is compared with that of a
-        direct sum from exact ranges under the same window. The comparison is necessary because a loss equals the
-        variance of the phase only to second order, and depends on the window.
+        Otherwise the result follows from the peak loss measured in the image. The loss equals the variance of the
+        phase only to second order, and depends on the window. It is therefore converted to a variance by the ratio of
+        variance to loss that exact ranges give under the same window. The variance of the cubic and higher phases is
+        subtracted, and the rest is converted to a quadratic phase.
         """
         effect = images.effect
         variance, other_variance = _phase_variances(effect)
@@ -308,11 +316,12 @@ class Study:
         return QUADRATIC_OF_VARIANCE * math.sqrt(max(measured, 0.0))
 
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
-        """Measure the displacement of a response from its position by exact ranges, and the line of its smear.
+        """Measure the displacement of a response, and the direction of its smear.
 
-        Up to a peak loss of about 3 dB, the position of the response is the peak of the image. With a larger loss,
-        the position follows from `reading`. If Doppler reverses within the aperture, the position is always the peak,
-        because the slope of the phase over the aperture then does not locate a response along a line.
+        The displacement is relative to the position that follows from exact ranges. Up to a peak loss of about 3 dB,
+        the position of the response is the peak of the image. For a larger loss, the position follows from `reading`.
+        If Doppler reverses within the aperture, the position is always the peak, because the slope of the phase over
+        the aperture then does not determine a position along a line.
         """
         variance, other_variance = _phase_variances(images.effect)
         has_line = variance + other_variance > _SINGLE_PEAK_RAD2 and not images.spread.is_round
@@ -321,8 +330,8 @@ class Study:
     def _expected_loss(self, images: Responses) -> float:
         """Expected peak loss of an image with errors: minus the natural logarithm of its relative peak power.
 
-        The peak power is relative to that of an error-free image. It follows from a direct sum over pulses and
-        frequencies under the window, with exact ranges.
+        The peak power is relative to an error-free image. It is computed from exact ranges, by a sum over pulses and
+        frequencies under the window of the mission.
         """
         collection = self.collection
         times = cell_centres(collection.aperture_time, _DIRECT_SUM_SAMPLES)
@@ -335,10 +344,10 @@ class Study:
         return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
 
     def focused(self, images: Responses) -> Responses:
-        """Refocus the image with errors with the autofocus algorithm of the mission.
+        """Apply the autofocus algorithm of the mission to the image with errors.
 
-        The quadratic phase changes from image line to image line. Therefore the phase is estimated only from the
-        middle lines that `shared_lines` counts.
+        The quadratic phase changes from image line to image line. Therefore it is estimated only from the middle
+        lines; their number is given by `shared_lines`.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
         lines = images.chip.image.shape[0]
@@ -347,9 +356,10 @@ class Study:
         return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
     def shared_lines(self, spread: Spread) -> int:
-        """Number of lines on either side of an image's middle line from which autofocus estimates the phase.
+        """Number of image lines on either side of the middle line that autofocus uses to estimate the phase.
 
-        These lines have nearly the same quadratic phase as the middle line, or contain part of the response.
+        A line is used if its quadratic phase is nearly that of the middle line, or if it contains part of the
+        response.
         """
         exact = self.analysis.exact
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
@@ -363,9 +373,9 @@ class Study:
         """Estimate how far a response spreads, from the range error that remains over the aperture.
 
         Each part of the aperture places the response on the line of equal range, at the point whose Doppler matches
-        the slope of the remaining range error. A small slope corresponds to a long distance if Doppler changes
-        slowly. This is the case in parts of a long aperture, or if the gradients of range and Doppler are nearly
-        parallel.
+        the slope of the remaining range error. If Doppler changes slowly along this line, even a small slope
+        corresponds to a long distance. This is the case in parts of a long aperture, or if the gradients of range and
+        Doppler are nearly parallel.
         """
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
@@ -397,5 +407,5 @@ class Study:
 
 
 def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
-    """Variances over the aperture of the equal-loss quadratic phase, and of the cubic and higher phases. [rad²]"""
+    """Variance over the aperture of the equal-loss quadratic phase, and of the cubic and higher phases. [rad²]"""
     return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2

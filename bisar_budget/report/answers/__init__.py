@@ -1,13 +1,13 @@
-"""Write the answer of any command in any format. The module `NAME_answer` describes the answer of the command NAME.
+"""Write the answer (the result) of a command in a format; the module `NAME_answer` is for the command NAME.
 
-The module of an answer has three functions, each of which takes the sequence of answers, one for each mission. The
-answers of `passes`, `sweep` and `diff` are about one run, so that their sequence has one entry.
+The module of an answer has three functions. Each takes a sequence of answers, with one answer for each mission. The
+answers of `passes`, `sweep` and `diff` are about a whole run, so their sequence has one entry.
 
 - `content(answers)` returns the content of the JSON document, without its first keys `format` and `version`;
 - `records(answers)` returns the table of numbers for CSV, data frames and workbooks, in SI units and radians;
 - `document(answers, style)` returns the text of the answer, for a terminal, Markdown, HTML and workbooks.
 
-A format that an answer writes in its own way is a function of its module, such as `as_sdoc(answers, style)`.
+If a format needs its own code for an answer, the module has a function for it, such as `as_sdoc(answers, style)`.
 """
 
 import os
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class AnswerForm(NamedTuple):
-    """The answer of a command, and the formats that its module writes in its own way."""
+    """The answer of a command, and the formats for which its module has functions of its own."""
 
     command: str
     own_formats: tuple[str, ...] = ()
@@ -54,7 +54,11 @@ _FORMAT_OF_SUFFIX = {
 
 
 class Records(NamedTuple):
-    """A table of numbers and short texts: the names of its columns, and one mapping of them for each line."""
+    """A table of numbers and short strings.
+
+    `columns` has the names of the columns. Each item of `lines` is a line of the table: it maps the column names to
+    values.
+    """
 
     columns: Sequence[str]
     lines: Sequence[Mapping[str, object]]
@@ -65,12 +69,12 @@ class Records(NamedTuple):
 
 
 def suffixes(command: str) -> dict[str, str]:
-    """Formats of the answer of a command, by the suffixes of their files."""
+    """Formats available for the answer of a command, by file name suffix."""
     return {suffix: name for suffix, name in _FORMAT_OF_SUFFIX.items() if name in ANSWERS[command].formats}
 
 
 def format_of_file(command: str, name: str) -> str | None:
-    """Find the format of an answer for a file name such as `limits.csv`; None if the suffix belongs to no format."""
+    """Find the format of an answer for a file name such as `limits.csv`; None if the suffix is not known."""
     lowered = name.lower()
     matches = [suffix for suffix in suffixes(command) if lowered.endswith(suffix)]
     return _FORMAT_OF_SUFFIX[max(matches, key=len)] if matches else None
@@ -88,9 +92,9 @@ def records_of(command: str, answers: Sequence[object]) -> Records:
 
 
 def written(command: str, format_name: str, answers: Sequence[object], style: "Style") -> str | bytes:
-    """Format the answers of a command, one for each mission, as `format_name`, without the drawings of Markdown.
+    """Write the answers of a command, one for each mission, in the format `format_name`.
 
-    Text ends with a newline. A workbook is returned as bytes.
+    Text ends with a newline. A workbook is returned as bytes. The drawings of a Markdown report are not included.
 
     Raises
     ------
@@ -105,8 +109,8 @@ def files(
 ) -> dict[str, str | bytes]:
     """Format the answers of a command as the contents of files, by path; nothing is written to disk.
 
-    The drawings of Markdown come first, in a folder beside `path`, and the file `path` itself is last. If `path` is
-    empty, there are no drawings. Raises the same errors as `written`.
+    The drawings of a Markdown report come first, in a folder beside `path`, and the file `path` itself is last. If
+    `path` is empty, there are no drawings. Raises the same errors as `written`.
     """
     module = module_of(command)
     if format_name in ANSWERS[command].own_formats:

@@ -1,6 +1,7 @@
-"""The answer of the command allocate: the sheet of specifications, and the offer that is compared with it.
+"""Output of the `allocate` command: the sheet of specifications, compared with a supplier's offer if there is one.
 
-Sphinx-Needs and StrictDoc read the specifications as requirements derived from the requirements of the mission.
+For Sphinx-Needs and StrictDoc, the specifications are written as requirements that are derived from the requirements
+of the mission.
 """
 
 import math
@@ -34,7 +35,7 @@ Answer = tuple[SpecificationSheet, Offer | None]  # a sheet, and the offer that 
 
 # ---------------------------------------------------------------- for programs
 def content(answers: Sequence[Answer]) -> dict[str, object]:
-    """Content of the JSON document `allocate/1`. Values are in SI; a missing value is null."""
+    """Content of the JSON document `allocate/1`, in SI units; a missing value is null."""
     return {"missions": [_item(answer) for answer in answers]}
 
 
@@ -96,7 +97,7 @@ def _offer(offer: Offer) -> dict[str, object]:
 def records(answers: Sequence[Answer]) -> Records:
     """Table of the answers: one line for each specification, in SI units.
 
-    The last columns are the shares of the requirements that the specification uses.
+    The last columns are the shares of the requirements that each specification uses.
     """
     shares = [
         key
@@ -124,7 +125,7 @@ def records(answers: Sequence[Answer]) -> Records:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[Answer], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: the sheet of specifications, and the offer that is compared with it."""
+    """Text of each answer: the sheet of specifications, compared with a supplier's offer if there is one."""
     sheets = [sheet for sheet, _ in answers]
     chapters = [
         mission_chapter(answer[0], number, _blocks(answer, f"mission-{number}"))
@@ -183,7 +184,7 @@ def _offered(offer: Offer) -> str:
 
 
 def _parts_words(spec: Specification) -> str:
-    """Text that names the first catalogue parts that meet a specification, and says how many more there are."""
+    """Text with the first catalogue parts that meet a specification, and with the number of further parts."""
     more = f" and {len(spec.parts) - _LISTED_COUNT} more" if len(spec.parts) > _LISTED_COUNT else ""
     return f"{', '.join(spec.parts[:_LISTED_COUNT])}{more}"
 
@@ -191,7 +192,8 @@ def _parts_words(spec: Specification) -> str:
 def _broken_words(row: Broken) -> list[str]:
     """Table cells for a row in which the fixed errors leave no room for the specified errors.
 
-    They are its id, its utilization by the fixed errors, the allowed utilization, and a remark.
+    The cells are the id of the row, its utilization due to the fixed errors alone, the allowed utilization, and a
+    remark.
     """
     if row.used is None:
         return [row.id, "-", percent(row.allowed), "over its limit: they leave no image"]
@@ -203,7 +205,7 @@ def _broken_words(row: Broken) -> list[str]:
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
-    """Sentence that says what to change if the fixed errors leave no room for the specified errors."""
+    """Sentence that suggests a change if the fixed errors leave no room for the specified errors."""
     used = [math.inf if row.used is None else row.used for row in sheet.broken]
     room_fraction = 1 - max(used) / (1 - MIN_ROOM_FRACTION)
     permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
@@ -286,7 +288,7 @@ _SPECIFICATION_GRAMMAR = {"REQUIREMENT": {"UID": True, "TITLE": True, "STATEMENT
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification for Sphinx-Needs: a need of type `req`, with links to the requirements above it."""
+    """Write each specification for Sphinx-Needs: a need of type `req`, with links to its parent requirements."""
     needs: list[tuple[tuple[str, ...], dict[str, object]]] = []
     for sheet, identity, spec in _specified(answers, style):
         content = [_statement(spec), _rationale(sheet, spec), f"{sheet.name}, {identity.path}"]
@@ -325,7 +327,7 @@ def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
 def _specified(
     answers: Sequence[Answer], style: Style
 ) -> Iterator[tuple[SpecificationSheet, Identity, Specification]]:
-    """Yield every specification that has a value, with its sheet and the identity of its mission."""
+    """Yield every specification that has a value, with its sheet and the identity of the mission."""
     sheets = [sheet for sheet, _ in answers if sheet.findings is not None]
     missions = [sheet.findings for sheet in sheets if sheet.findings is not None]
     for sheet, identity in zip(sheets, identities(missions, style), strict=True):
@@ -337,7 +339,7 @@ def _title(sheet: SpecificationSheet, spec: Specification) -> str:
 
 
 def _statement(spec: Specification) -> str:
-    """Write a specification as a sentence. The key of the mission file defines what the number means."""
+    """Write a specification as a sentence that names its key in the mission file; the file defines its meaning."""
     return f"{spec.key}, as the mission file counts it, shall be at most {spec.text}."
 
 
@@ -356,8 +358,8 @@ def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
 def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
     """Ids of the project requirements from which a specification is derived.
 
-    They are the ids that the mission file gives to the rows that limit the specification, to the requirements of
-    these rows, and to the rows about the specified error itself.
+    These ids are given in the mission file for the rows that limit the specification, for the requirements of these
+    rows, and for the rows about the specified error itself.
     """
     findings = sheet.findings
     if findings is None or findings.mission is None:

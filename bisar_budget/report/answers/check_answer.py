@@ -1,4 +1,4 @@
-"""The answer of the command check as a document: the compliance report of a run."""
+"""Output of the `check` command as a document: the compliance report of a run."""
 
 from collections.abc import Mapping
 
@@ -17,18 +17,18 @@ from bisar_budget.report.words.sentences import allowable_words, matters, row_si
 
 
 def document(report: Report, style: Style) -> doc.AnswerDocument:
-    """Text of the answer: the compliance report, which is the same in every format with pages."""
+    """Text of the answer: the compliance report, which is the same in HTML, Markdown and workbooks."""
     return compliance(report, style)
 
 
 def records(report: Report) -> Records:
-    """Table of the answer, with the columns of CSV: one line for each requirement, row and fault."""
+    """Table of the answer with the columns of the CSV format: one line for each requirement, row and fault."""
     lines = [dict(zip(CSV_COLUMNS, cells, strict=True)) for mission in report.missions for cells in lines_of(mission)]
     return Records(CSV_COLUMNS, lines)
 
 
 def as_html(report: Report, style: Style) -> str:
-    """Write the compliance report as a page."""
+    """Write the compliance report as an HTML page."""
     return html.page(document(report, style))
 
 
@@ -43,7 +43,7 @@ def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
 
 
 def as_xlsx(report: Report, style: Style) -> bytes:
-    """Write the compliance report as a workbook; its last sheet has the lines of CSV."""
+    """Write the compliance report as a workbook; its last sheet has the same lines as the CSV format."""
     return xlsx.workbook(document(report, style), records(report))
 
 
@@ -51,7 +51,7 @@ _MAX_NOTEBOOK_ROWS = 12  # largest number of rows of a notebook
 
 
 def brief(findings: MissionFindings) -> doc.AnswerDocument:
-    """Shorter text of the answer for a notebook: the table of requirements, and the rows that matter most."""
+    """Short compliance report for a notebook: the table of requirements, and the rows that matter most."""
     rows = [row for row in worst_first(findings.rows) if matters(row) or findings.is_empty]
     blocks: list[doc.Block] = [
         opening(findings, verdict(findings), findings.status, rule_words(findings)),

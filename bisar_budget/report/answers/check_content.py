@@ -26,7 +26,10 @@ CHECK_FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the JSON item of one mission, with each row on its own line. A non-finite number raises an error."""
+    """Write the JSON item of one mission, with each row on its own line.
+
+    A non-finite number raises an error.
+    """
     item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
     return indented(item, _INDENTED_LEVELS, _MARGIN)
 
@@ -46,7 +49,7 @@ _INDENTED_LEVELS, _MARGIN = 2, "    "  # of a mission and of its rows; the conte
 
 
 def outside_item(mission: "AboutMission") -> dict[str, object]:
-    """JSON item about changes and overrides from outside the mission file, the same in all JSON documents."""
+    """JSON item about changes and overrides from outside the mission file. All JSON documents use it."""
     return {
         "set": [change._asdict() for change in mission.changes],
         "overrides": [override._asdict() for override in mission.overrides],
@@ -54,7 +57,7 @@ def outside_item(mission: "AboutMission") -> dict[str, object]:
 
 
 def fault_item(fault: Fault) -> dict[str, object]:
-    """JSON item of a fault in a file."""
+    """JSON item about a fault in a file."""
     return {
         "line": fault.line,
         "column": fault.column,
@@ -164,7 +167,10 @@ def _warning(warning: FileWarning) -> dict[str, object]:
 
 
 def verdict_item(verdict: Verdict) -> dict[str, object]:
-    """JSON item about a verdict from images formed with an error at its limit, with the codes of its reasons."""
+    """JSON item about a verdict on a limit, with the codes of the reasons for the verdict.
+
+    The verdict is based on simulated images that contain an error exactly at this limit.
+    """
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
@@ -230,9 +236,9 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, object]:
 
 
 def _stated_accuracy(stated: StatedAccuracy) -> dict[str, object]:
-    """JSON item about the accuracy that the source of a path states, as standard deviations.
+    """JSON item about the accuracy stated by the source of a path, as standard deviations.
 
-    There is a value for each axis of the scene, or a single total without a direction.
+    The standard deviations are given for each axis of the scene, or as a single total without a direction.
     """
     variances = [row[index] for index, row in enumerate(stated.covariance or ())]
     sigmas = [math.sqrt(max(variance, 0.0)) for variance in variances]

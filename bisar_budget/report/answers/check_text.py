@@ -138,8 +138,8 @@ def _requirements(mission: MissionFindings) -> doc.Block:
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
     """Yield the name and text of each line about the collection geometry.
 
-    With -v, a further line gives the number of rows of each status. The line about the model is left out, because the
-    model is written after the name of the mission.
+    With the option `-v`, an additional line gives the number of rows with each status. There is no line about the
+    model, because the model is written after the name of the mission.
     """
     yield from ((key, text) for key, text in head(mission) if key != "Model")
     if style.verbosity > 0:
@@ -221,10 +221,10 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
 
 
 def _limited_by(row: Row) -> str:
-    """Short text for the table column that names the limit of each row.
+    """Short text for the table column that shows how a row is limited.
 
-    Usually this is the requirement that sets the allowable. If that requirement is on the row's own metric, it is the
-    equation of the limit instead.
+    The text names the requirement that sets the allowable. If this requirement limits the metric of the row itself,
+    the text names the equation of the limit instead.
     """
     binding = binding_words(row)
     if binding:
@@ -236,8 +236,8 @@ def _limited_by(row: Row) -> str:
 def _short_reference(equation: str) -> str:
     """Short name of an equation for a table column.
 
-    `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, and `(25)` is not changed. An equation of the full
-    model becomes `full`. Other equations have an empty name.
+    `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, and `(25)` is not changed. `full model` and `first
+    principles` become `full`. The result is empty for any other equation.
     """
     if equation in ("full model", "first principles"):
         return "full"
@@ -251,7 +251,7 @@ def _short_reference(equation: str) -> str:
 def _details(mission: MissionFindings, style: Style) -> Iterator[doc.Block]:
     """Yield paragraphs with the reasons for the status of rows. Rows with the same reasons share a paragraph.
 
-    With -v every row has a paragraph with its reason, notes and source.
+    With the option `-v`, each row has its own paragraph with its reason, notes and source.
     """
     groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
     for row in worst_first(mission.rows):

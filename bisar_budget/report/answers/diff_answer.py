@@ -1,4 +1,7 @@
-"""The answer of the command diff: the effects of a change on missions, and what a gate refuses."""
+"""Output of the `diff` command: the effects of a change on missions, and the refusals of a gate.
+
+A gate refuses a change that uses up too much of a margin or loosens a rule.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -25,7 +28,7 @@ from bisar_budget.units import format_quantity
 
 
 class Compared(NamedTuple):
-    """A comparison, the gate that judges it, and whether to show rows that changed by less than 1 %."""
+    """A comparison and the gate that judges it. If `all_rows`, rows that changed by less than 1 % are shown too."""
 
     changes: ChangeSet
     gate: Gate | None
@@ -34,7 +37,10 @@ class Compared(NamedTuple):
 
 # ---------------------------------------------------------------- for programs
 def content(answers: Sequence[Compared]) -> dict[str, object]:
-    """Content of the JSON document `diff/1`. Later versions may add keys, but never change or remove them."""
+    """Content of the JSON document `diff/1`.
+
+    Later versions of the format may add keys, but never change or remove them.
+    """
     ((comparison, gate, _),) = answers
     return {
         "tolerated_erosion": None if gate is None else gate.tolerated,
@@ -103,8 +109,8 @@ _DIFF_COLUMNS = (
 def records(answers: Sequence[Compared]) -> Records:
     """Table of the answer: one line for each changed row, requirement and input, and for each refusal.
 
-    `kind` says which of these a line is about. The texts `before` and `after` are those of inputs and geometry, the
-    statuses of requirements, and the reasons of refusals.
+    The column `kind` distinguishes these lines. The columns `before` and `after` have the values of inputs and
+    geometry, the statuses of requirements, and the reasons of refusals, as text.
     """
     lines: list[dict[str, object]] = []
     for comparison, gate, _ in answers:
@@ -141,7 +147,10 @@ def _row_line(change: Change, is_refused: bool) -> dict[str, object]:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[Compared], style: Style) -> doc.AnswerDocument:
-    """Text of the answer: the changes of each mission, a table of its rows with the largest erosion first."""
+    """Text of the answer: the changes of each mission, with a table of the changed rows, the largest erosion first.
+
+    The erosion is the fraction of a row's margin that the change uses up.
+    """
     chapters: list[doc.Chapter] = []
     for comparison, gate, all_rows in answers:
         for number, mission in enumerate(comparison.missions, 1):
@@ -256,7 +265,7 @@ def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWor
 
 
 def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_ChangeInWords]:
-    """Refusals of a gate, including the ones that `--allow` lets through."""
+    """Refusals of a gate, including the refusals that are overridden by `--allow`."""
     labels = {False: "refused", True: "allowed"}
     return [
         _ChangeInWords(labels[refusal.is_allowed], refusal.id, "", _arrow(refusal.words))
@@ -269,7 +278,7 @@ def _arrow(words: str) -> str:
 
 
 def _groups(changes: Iterable[_ChangeInWords]) -> Iterator[doc.Block]:
-    """Yield one list of changes for each label, below its title."""
+    """Yield the changes in groups with the same label, each as a list below the title of the label."""
     changes = list(changes)
     for label, title in _TITLE_OF_LABEL.items():
         items: list[doc.Line] = [
@@ -280,7 +289,7 @@ def _groups(changes: Iterable[_ChangeInWords]) -> Iterator[doc.Block]:
 
 
 def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
-    """List the row changes to show: all with `all_rows`, otherwise changes of 1 % or more and refused changes."""
+    """List the row changes to show: all if `all_rows`, otherwise changes of 1 % or more and refused changes."""
     refused = mission.broken(gate.tolerated) if gate is not None else []
     return [change for change in mission.changes if all_rows or not change.is_small or change in refused]
 

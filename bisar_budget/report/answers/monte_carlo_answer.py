@@ -1,4 +1,4 @@
-"""The answer of a Monte Carlo: how often drawn errors meet each requirement."""
+"""The answer of a Monte Carlo analysis: how often randomly drawn errors meet each requirement."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,7 @@ from bisar_budget.units import format_quantity
 
 
 def content(answers: Sequence[MonteCarlo]) -> dict[str, object]:
-    """Content of the JSON document, as `check --monte-carlo` has it for the mission."""
+    """Content of the JSON document, in the form that `check --monte-carlo` uses for a mission."""
     (drawn,) = answers
     return monte_carlo_item(drawn)
 
@@ -26,7 +26,7 @@ def records(answers: Sequence[MonteCarlo]) -> Records:
 
 
 def document(answers: Sequence[MonteCarlo], style: Style) -> doc.AnswerDocument:
-    """Text of the answer: the probability of meeting each requirement, and sums for comparison."""
+    """Text of the answer: the probability of meeting each requirement, and the combined errors for comparison."""
     (drawn,) = answers
     chapter = doc.Chapter("Monte Carlo", list(draws(drawn)), "draws", level=2)
     facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
@@ -36,9 +36,10 @@ def document(answers: Sequence[MonteCarlo], style: Style) -> doc.AnswerDocument:
 
 
 def draws(drawn: MonteCarlo, name: str = "") -> Iterator[doc.Block]:
-    """Yield the table of results and remarks about it; `name` is the mission, for the label of the table.
+    """Yield the table with the results of a Monte Carlo analysis, and remarks on it.
 
-    The table has the probability of meeting each requirement, and combined sums for comparison.
+    The table has the probability of meeting each requirement, and the combined errors for comparison. `name` is the
+    name of the mission for the label of the table.
     """
     lines: list[doc.Line] = []
     for requirement in drawn.requirements:

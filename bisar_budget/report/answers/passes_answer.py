@@ -1,4 +1,4 @@
-"""The answer of the command passes: the passes of a satellite, also as events of a calendar (RFC 5545)."""
+"""Output of the `passes` command: the passes of a satellite as a report or as a calendar (RFC 5545)."""
 
 import math
 import re
@@ -59,7 +59,7 @@ def content(answers: Sequence[Passes]) -> dict[str, object]:
 
 
 def _summarized(passes: Passes) -> dict[str, int]:
-    """Numbers of passes that comply, are waived, fail, are not evaluated, or have no valid mission."""
+    """Number of passes with each outcome: compliant, waived, failed, not evaluated, or without a valid mission."""
     counts = passes.counts
     return {
         "comply": len(passes.complying),
@@ -71,7 +71,7 @@ def _summarized(passes: Passes) -> dict[str, int]:
 
 
 def _item(overpass: SatellitePass) -> dict[str, object]:
-    """Values that describe a pass; the keys are those of the JSON document and the CSV columns."""
+    """Values that describe a pass, by the keys of the JSON document, which are also the names of the CSV columns."""
     state = overpass.state
     values: dict[str, object] = {
         "number": overpass.number,
@@ -107,12 +107,12 @@ def _item(overpass: SatellitePass) -> dict[str, object]:
 
 
 def direction(overpass: SatellitePass) -> str:
-    """Text `ascending` for a satellite that flies towards north, or `descending` for one towards south."""
+    """`ascending` if the satellite flies towards the north during a pass, `descending` if towards the south."""
     return "ascending" if overpass.is_ascending else "descending"
 
 
 def records(answers: Sequence[Passes]) -> Records:
-    """Table of the answers: one line for each pass. Values are in SI and radians."""
+    """Table of the answers: one line for each pass, in SI units and radians."""
     lines = [
         {
             "file": passes.file,
@@ -152,16 +152,16 @@ _WAIVERS = doc.Head("waived by")  # column that is shown only if a pass is waive
 
 
 def document(answers: Sequence[Passes], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: verdict, table of passes, drawing of the sky, and notes that name the deciding rows.
+    """Text of each answer: verdict, table of passes, sky plot, and notes that name the deciding rows.
 
-    In a terminal, the table is at most 100 columns wide, without the column of waivers.
+    In a terminal, the table is at most 100 characters wide, not counting the column of waivers.
     """
     chapters = [mission_chapter(answer, number, _blocks(answer, number)) for number, answer in enumerate(answers, 1)]
     return mission_document("Passes", answers, chapters)
 
 
 def verdict(passes: Passes) -> str:
-    """Sentence that tells how many of the passes comply, with the minimum elevation, the squint and the period.
+    """Sentence with the number of passes that comply, the minimum elevation, the squint and the period.
 
     Waived passes are counted separately.
     """
@@ -200,12 +200,12 @@ def _counted(passes: Passes) -> Iterator[str]:
 
 
 def short_time(instant: Instant) -> str:
-    """Write an instant, rounded down to a minute, such as 2026-07-01 00:00."""
+    """Write an instant as text, rounded down to the minute, such as 2026-07-01 00:00."""
     return _seconds(Instant(instant.day, instant.seconds - instant.seconds % 60))[:16]
 
 
 def _seconds(instant: Instant) -> str:
-    """Write an instant, rounded to a second, such as 2026-07-01 05:30:12."""
+    """Write an instant as text, rounded to the nearest second, such as 2026-07-01 05:30:12."""
     rounded = Instant(instant.day, 0.0).after(math.floor(instant.seconds + 0.5))
     return rounded.as_text()[:19].replace("T", " ")
 
@@ -247,7 +247,7 @@ def _cells(overpass: SatellitePass) -> doc.Line:
 
 
 def _metres(size: float | None) -> str:
-    """Write a size [m] with three digits and without a power of ten; a dash for None."""
+    """Write a length [m] with three digits and without a power of ten; a dash for None."""
     return "-" if size is None else f"{size:.3g}" if size < 999.5 else f"{size:.0f}"
 
 
@@ -258,8 +258,8 @@ def _degrees(angle: float | None, digits: int = 0) -> str:
 def _notes(passes: Passes) -> Iterator[str]:
     """Yield the notes below the table of passes.
 
-    They name the deciding rows, reasons, passes that the period cuts off, and times without an orbit. Passes with the
-    same deciding row or reason share one note.
+    They state the deciding rows, the reasons, the passes that begin before or end after the period, and the times
+    without an orbit. Passes with the same deciding row or reason share one note.
     """
     for text, numbers in _grouped(passes.found, _decided):
         yield f"{sentence(text)}: {numbers}."
@@ -304,14 +304,14 @@ def _decided(overpass: SatellitePass) -> str:
 
 
 def _figureless(overpass: SatellitePass) -> str:
-    """Status and reason of a pass, where `#` replaces every number in the reason."""
+    """Text with the status and the reason of a pass, with every number in the reason replaced by `#`."""
     return f"{overpass.status} {re.sub(r'-?[0-9][0-9.]*', '#', overpass.reason)}"
 
 
 def _grouped(
     overpasses: Sequence[SatellitePass], text_of: Callable[[SatellitePass], str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield each different text from `text_of` with the numbers of the passes that have it."""
+    """Yield each distinct text that `text_of` returns for the passes, with the numbers of these passes."""
     groups: dict[str, list[int]] = {}
     for overpass in overpasses:
         if text := text_of(overpass):
@@ -321,7 +321,7 @@ def _grouped(
 
 
 def _numbers(numbers: Iterable[int]) -> str:
-    """Write ascending numbers as text, such as "1, 3 to 5"; empty without numbers."""
+    """Write ascending numbers as text, such as "1, 3 to 5"; empty if there are no numbers."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -340,10 +340,10 @@ _MAX_LINE_BYTES = 75  # without the end of the line
 
 
 def as_ics(answers: Sequence[Passes], style: Style) -> str:
-    """Write a calendar with an event for each pass (RFC 5545), created on the day of the check (UTC).
+    """Write a calendar (RFC 5545) with an event for each pass. Its creation date is the day of the check in UTC.
 
-    Lines end with LF; the file must have CR LF instead. With newer orbital elements an event keeps its UID, as
-    long as the culmination stays in the same half hour.
+    Lines end with LF, which must be converted to CR LF in the file. If the culmination with newer orbital elements is
+    still within the same half hour, the event keeps its UID.
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {__version__}//EN"]
     for passes in answers:
@@ -353,7 +353,7 @@ def as_ics(answers: Sequence[Passes], style: Style) -> str:
 
 
 def _events(passes: Passes) -> Iterator[str]:
-    """Yield the lines of an event for each pass."""
+    """Yield the lines of the calendar events, with one event for each pass."""
     seen: Counter[str] = Counter()
     timestamp = _stamp(datetime(passes.day.year, passes.day.month, passes.day.day, tzinfo=UTC))
     for overpass in passes.found:
@@ -414,7 +414,7 @@ def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    """Escape text as in RFC 5545, section 3.3.11, with a backslash before each separator."""
+    """Escape text as required by RFC 5545, section 3.3.11, with a backslash before each separator."""
     text = text.replace("\\", "\\\\").replace(";", "\\;").replace(",", "\\,").replace("\n", "\\n")
     return text.encode("utf-8", "backslashreplace").decode()
 
@@ -422,8 +422,8 @@ def _escaped(text: str) -> str:
 def _folded(line: str) -> Iterator[str]:
     """Fold a line into lines of at most 75 bytes (RFC 5545). Every line after the first begins with a space.
 
-    No character is split. A continued line does not begin with a colon, and two adjacent `#` are put on different
-    lines. Otherwise CI logs could take the text for a command.
+    The bytes of a character stay on one line. A continued line never begins with a colon, and two adjacent `#` are
+    put on different lines, so that CI logs do not mistake the text for a command.
     """
     start, size = 0, 0
     for index, letter in enumerate(line):

@@ -1,4 +1,4 @@
-"""The answer of the command sensitivity: the effect of every number of a mission on its worst utilization."""
+"""Output of the `sensitivity` command: the effect of every number in a mission file on the worst utilization."""
 
 import math
 import re
@@ -18,7 +18,7 @@ from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent
 
 # ---------------------------------------------------------------- for programs
 def content(answers: Sequence[Sensitivity]) -> dict[str, object]:
-    """Content of the JSON document `sensitivity/1`. Values are in SI; a missing value is null."""
+    """Content of the JSON document `sensitivity/1`, in SI units; a missing value is null."""
     return {
         "missions": [
             {"file": answer.file, "name": answer.name, **outside_item(answer), **_ranked(answer)}
@@ -34,7 +34,7 @@ _SLOPE_COLUMNS = (
 
 
 def records(answers: Sequence[Sensitivity]) -> Records:
-    """Table of the answers: one line for each number, in SI units, the number with the largest effect first."""
+    """Table of the answers: one line for each number in a mission file, in SI units, largest effect first."""
     lines = [
         {"file": answer.file, "name": answer.name, **_slope(slope), "to_limit": answer.to_limit(slope)}
         for answer in answers
@@ -93,13 +93,20 @@ def _relaxed(relaxed: Relaxed) -> dict[str, object]:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[Sensitivity], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: a table of numbers, a drawing of their effects, and the cost of doubled errors."""
+    """Text of each answer: a table of numbers, a drawing of their effects, and the effect of doubling errors.
+
+    The numbers are the numerical values in the mission file. If the shares of the platforms are balanced, doubling an
+    error also affects the utilization of the other errors.
+    """
     chapters = [mission_chapter(answer, number, _blocks(answer, number)) for number, answer in enumerate(answers, 1)]
     return mission_document("Sensitivity", answers, chapters)
 
 
 def _blocks(sensitivity: Sensitivity, number: int) -> Iterator[doc.Block]:
-    """Yield the blocks of a sensitivity analysis. The number with the smallest change to the limit is first."""
+    """Yield the blocks of a sensitivity analysis, with a table of the numbers in the mission file.
+
+    The table begins with the number that uses up the margin with the smallest change.
+    """
     requirement = BINDING_WORDS.get(sensitivity.requirement, sensitivity.requirement.replace("_", " "))
     verdict = (
         f"worst utilization {percent(sensitivity.utilization)}: {printable(sensitivity.worst_row)} ({requirement})"
@@ -143,10 +150,10 @@ def _table(sensitivity: Sensitivity) -> Iterator[doc.Block]:
 
 
 def to_limit(sensitivity: Sensitivity, slope: Slope) -> str:
-    """Text with the change in a number of the mission file that uses up the margin.
+    """Text with the change in a number of the mission file that would use up the margin.
 
-    The change is in percent, degrees or dB, or a factor if the number changes tenfold or more. It is a hyphen if no
-    change does so.
+    The change is in percent, degrees or dB, or is a factor if the number changes tenfold or more. The text is a
+    hyphen if no change would use up the margin.
     """
     change = sensitivity.to_limit(slope)
     if change is None:

@@ -1,4 +1,4 @@
-"""Parts that the documents of all answers share: the opening, the chapter of a mission, the table of requirements."""
+"""Parts of documents that all answers have in common: opening, chapter of a mission, table of requirements."""
 
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
@@ -16,22 +16,22 @@ from bisar_budget.report.words.sentences import own_id
 def opening(
     mission: AboutMission, verdict: str, status: str, terms: str = "", more: Sequence[str] = ()
 ) -> doc.Opening:
-    """Make the opening of an answer about a mission; `status` gives the colour of the verdict."""
+    """Make the opening of an answer about a mission; `status` determines the colour of the verdict."""
     name = printable(mission.name)
     return doc.Opening(verdict, status, file_words(mission), name, terms, other_overrides(mission), more)
 
 
 def mission_chapter(mission: AboutMission, number: int, blocks: Iterable[doc.Block]) -> doc.Chapter:
-    """Make the chapter of the mission with the given number; the first mission has the number 1."""
+    """Make the chapter about a mission; `number` is 1 for the first mission."""
     return doc.Chapter(printable(mission.name), list(blocks), f"mission-{number}", level=2, is_article=True)
 
 
 def mission_document(
     title: str, missions: Sequence[AboutMission], chapters: Sequence[doc.Chapter]
 ) -> doc.AnswerDocument:
-    """Make the document of an answer, which has one chapter for each mission, and then chapters about the run.
+    """Make the document of an answer, with one chapter for each mission, followed by chapters about the run.
 
-    `title` is the kind of answer.
+    `title` states the kind of answer, such as `Passes`.
     """
     names = [printable(mission.name) for mission in missions]
     files = [printable(mission.file) for mission in missions]

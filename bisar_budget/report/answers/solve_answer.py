@@ -1,4 +1,4 @@
-"""The answer of the command solve: the borders of compliance of a number, or a comparison of catalogue parts."""
+"""Output of the `solve` command: the values at which compliance begins or ends, or compared catalogue parts."""
 
 from collections.abc import Iterator, Sequence
 
@@ -28,7 +28,7 @@ Answer = Solution | Comparison
 
 # ---------------------------------------------------------------- for programs
 def content(answers: Sequence[Answer]) -> dict[str, object]:
-    """Content of the JSON document `solve/1`. Values are in SI; a missing value is null."""
+    """Content of the JSON document `solve/1`, in SI units; a missing value is null."""
     return {"missions": [_item(answer) for answer in answers]}
 
 
@@ -41,10 +41,11 @@ _OF_STATE = ("status", "row", "requirement", "utilization", "reason")
 
 
 def records(answers: Sequence[Answer]) -> Records:
-    """Table of the answers: one line for each crossing, or for each part of the catalogue.
+    """Table of the answers: one line for each crossing, or one line for each part of a catalogue.
 
-    A search without a crossing has one line without a value. The columns about `inside` are those of the last value
-    that complies, and the columns about `outside` are those of the next value, which does not comply.
+    A crossing is a value at which the compliance of the mission begins or ends. If a search finds no crossing, its
+    line has no value. The columns with `inside` in their names are about the last value that complies, and the
+    columns with `outside` are about the next value, which does not comply.
     """
     if any(isinstance(answer, Comparison) for answer in answers):
         return Records(_PART_COLUMNS, [line for answer in answers for line in _part_lines(_item(answer))])
@@ -110,7 +111,7 @@ def _solved(solution: Solution) -> dict[str, object]:
 
 
 def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
-    """JSON item about the row that was verified in an image. The verdict has the form of `verify --format json`."""
+    """JSON item about the row that was verified in an image; its verdict has the form of `verify --format json`."""
     if imaged is None:
         return None
     return {
@@ -126,7 +127,7 @@ def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
 def _compared(comparison: Comparison) -> dict[str, object]:
     """JSON item about a comparison of catalogue parts.
 
-    It has the same keys as an item of `_solved`. Keys that do not apply are null.
+    The item has the same keys as the result of `_solved`. Values that do not apply are null.
     """
     best = next(iter(comparison.complying), None)
     return {
@@ -193,7 +194,7 @@ def _state(state: State) -> dict[str, object]:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[Answer], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: its crossings, or a table of catalogue parts."""
+    """Text of each answer: the crossings at which compliance begins or ends, or a table of catalogue parts."""
     chapters = [
         mission_chapter(
             answer, number, _crossing_blocks(answer) if isinstance(answer, Solution) else _part_blocks(answer)
@@ -326,7 +327,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _shown(imaged: Imaged) -> str:
-    """Text with the verdict from an image on the binding row, or with the reason why there is no verdict."""
+    """Text with the verdict of an image on the binding row, or with the reason why there is no verdict."""
     row = f"{printable(imaged.row)} at {printable(imaged.at)}"
     verdict = imaged.verdict
     if verdict is None:
@@ -346,12 +347,12 @@ def _shown(imaged: Imaged) -> str:
 
 
 def _undecided(requirement: str | None) -> str:
-    """Text for a mission state in which no row decides; it names the requirement that cannot be judged, if any."""
+    """Text for a value without a deciding row; it names the requirement that cannot be judged, if there is one."""
     return "no row decides" if requirement is None else f"{REQUIREMENT_NAMES[requirement]} cannot be judged"
 
 
 def _state_words(state: State) -> str:
-    """Text about the mission at one value of the key: its status, the deciding row and the row's utilization."""
+    """Text about the mission at one value of the key: its status, and the deciding row with its utilization."""
     word = STATUS[state.status].text
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:

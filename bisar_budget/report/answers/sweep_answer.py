@@ -1,6 +1,7 @@
-"""The answer of the command sweep: the verdict of a mission for many sets of values.
+"""Output of the `sweep` command: the verdict of a mission for many sets of values.
 
-CSV, Parquet and NetCDF files are written part by part by `report.tables`. The formats here have all cases in memory.
+CSV, Parquet and NetCDF files are written part by part by `report.tables`. The formats in this module need all cases
+in memory.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,9 +27,10 @@ _NUMBER_FORMAT = ".6g"
 
 
 class SweptCases(NamedTuple):
-    """All cases of a sweep: their table, its blocks in SI, the values (cases,) of each column, a summary, a drawing.
+    """All cases of a sweep: a description of the table, its blocks in SI units, its columns (cases,), and a summary.
 
-    `status` gives the colour of the summary. `drawing` is SVG text, and is empty if the cases have no axes to draw.
+    `status` determines the colour of the summary. `drawing` is SVG text, and is empty if the cases have no axes to
+    draw.
     """
 
     mission: Mission
@@ -52,7 +54,7 @@ class SweptCases(NamedTuple):
 
     @property
     def changes(self) -> tuple[SetValue, ...]:
-        """Values that options put in place of those of the file."""
+        """Values that were set by options in place of the values in the file."""
         return self.mission.changes
 
 
@@ -60,7 +62,8 @@ class SweptCases(NamedTuple):
 def content(answers: Sequence[SweptCases]) -> dict[str, object]:
     """Content of the JSON document `sweep/1`: the columns with their units, and the values of each case.
 
-    Varied keys have the units of the request, other columns SI units. A missing value is null.
+    The values of varied keys have the units that the user gave, and all other values have SI units. A missing value
+    is null.
     """
     (swept,) = answers
     facts = {name: value for name, value in swept.described.facts.items() if name not in ("format", "source")}
@@ -79,7 +82,7 @@ def _cases(swept: SweptCases) -> Iterator[dict[str, object]]:
 
 
 def _values(column: Column, values: Values) -> list[object]:
-    """Values of a column, in which a missing number or text is None."""
+    """List the values of a column; a missing number or an empty text becomes None."""
     if column.is_text:
         return [text or None for text in values.tolist()]
     return [number if np.isfinite(number) else None for number in np.asarray(values, float).tolist()]
@@ -94,14 +97,14 @@ def records(answers: Sequence[SweptCases]) -> Records:
 
 
 def as_csv(answers: Sequence[SweptCases], style: Style) -> str:
-    """Write the table with its metadata, as `sweep` writes it to a file."""
+    """Write the table of all cases with its metadata as CSV, in the same form as in the files of `sweep`."""
     (swept,) = answers
     return "".join(texts(swept.described, swept.blocks))
 
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[SweptCases], style: Style) -> doc.AnswerDocument:
-    """Text of the answer: how many cases comply, a drawing of them, and a table of them."""
+    """Text of the answer: the number of cases that comply, a drawing of the cases, and a table of them."""
     (swept,) = answers
     return mission_document("Trade study", answers, [mission_chapter(swept, 1, _blocks(swept))])
 
@@ -118,7 +121,7 @@ def _blocks(swept: SweptCases) -> Iterator[doc.Block]:
 
 
 def _listed(swept: SweptCases, varied: Sequence[Column], count: int) -> Iterator[doc.Block]:
-    """Yield the table of the first `count` cases, and a remark if there are more."""
+    """Yield a table of the first `count` cases, and a remark if there are further cases."""
     heads = [
         *(doc.Head(column.name, "" if column.is_text else "number", column.unit) for column in varied),
         doc.Head("status"),
@@ -149,7 +152,7 @@ def _shown(value: object) -> str:
 
 
 def status_of(statuses: Mapping[str, int]) -> str:
-    """Status for the colour of a summary, which is the best status of a case; `fail` without cases.
+    """Status that determines the colour of a summary: the best status of all cases; `fail` if there are no cases.
 
     `statuses` has the number of cases with each status.
     """

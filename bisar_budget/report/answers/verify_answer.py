@@ -1,4 +1,4 @@
-"""The answer of the command verify: verdicts from images at the limits of a mission."""
+"""Output of the `verify` command: verdicts from images that are formed with errors at the limits of a mission."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -38,7 +38,7 @@ def content(answers: Sequence[VerifiedMission]) -> dict[str, object]:
 
 
 def records(answers: Sequence[VerifiedMission]) -> Records:
-    """Table of the answers: one line for each limit, with the keys of a row of `verify/1`."""
+    """Table of the answers: one record for each limit, with the keys of a row in the JSON document `verify/1`."""
     lines = [
         {"file": answer.file, "name": answer.name, **verdict_item(row)} for answer in answers for row in answer.rows
     ]
@@ -66,9 +66,11 @@ def _blocks(mission: VerifiedMission) -> Iterator[doc.Block]:
 
 
 def evidence(rows: Sequence[Verdict]) -> Iterator[doc.Block]:
-    """Yield the table of verdicts, a second table of verdicts with autofocus, and remarks below them.
+    """Yield the table of verdicts, a second table of verdicts with autofocus, and remarks on both.
 
-    For a phase, the column `budget` is by the gating model, and the next column has the value by the other model.
+    For a phase, the column `budget` has the allowed phase, which the error at the limit causes according to the
+    gating model (the model that decides the verdict of the row). The next column has the phase that the same error
+    causes according to the other model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
     heads = doc.heads("row", *doc.numbers("limit", "budget", other_head, "exact", "image"), "verdict")
@@ -87,7 +89,7 @@ def evidence(rows: Sequence[Verdict]) -> Iterator[doc.Block]:
 
 
 def reasons_of(rows: Sequence[Verdict]) -> list[str]:
-    """List the reasons of the verdicts. Each reason is written once, after the ids of its rows."""
+    """List the reasons of the verdicts. Each reason is listed once, after the ids of the rows to which it applies."""
     ids: dict[str, list[str]] = {}
     for row in rows:
         for variant, reason in (("", row.reason), (", with autofocus", row.reason_autofocus)):
@@ -97,10 +99,11 @@ def reasons_of(rows: Sequence[Verdict]) -> list[str]:
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Yield remarks for below the table of verdicts.
+    """Yield the remarks below the table of verdicts.
 
-    They give the kind of phase in the table, the largest distance between the measured displacement and the
-    prediction by the gating model, and the largest angle between the measured smear and the prediction by (31).
+    They state the kind of phase in the table, the largest distance between the measured and the predicted
+    displacement, and the largest angle between the measured and the predicted smear. The displacement is predicted by
+    the model that decides the verdict, and the smear by equation (31).
     """
     hidden = [row for row in rows if row.of_equal_loss]
     if hidden:
@@ -147,14 +150,15 @@ def _smaller(row: Verdict) -> float | None:
 
 
 def limit(row: Verdict) -> str:
-    """Text with the size of the error, at its limit, for which the image was formed."""
+    """Text with the size of the error in the image: the limit of the row."""
     return format_limit(row.boundary_error, row.unit)
 
 
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Five table cells with the numbers of a verdict. Phases are in rad.
+    """Five table cells with the numbers of a verdict, with phases in rad.
 
-    They are the budget, the predictions by Table II, the full model and exact ranges, and the measurement.
+    The cells are the budget, three predictions (from Table II, from the full model, and from exact ranges), and the
+    measured value.
     """
     if row.requirement_db is not None:
         return f"{row.requirement_db:.4g} dB", "-", "-", "-", _decibel(row.measured_db)
@@ -169,9 +173,9 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
 
 
 def _by_full(row: Verdict) -> float | None:
-    """Quadratic phase by the full model, to compare with the budget; None if there is none. [rad]
+    """Quadratic phase according to the full model, for comparison with the budget; None if not available. [rad]
 
-    If the peak loss was measured in the image, it is the quadratic phase of equal peak loss.
+    If the peak loss was measured in the image, the result is the quadratic phase that causes the same peak loss.
     """
     if row.full_qpe_rad is None or row.measured_equal_loss_qpe_rad is None:
         return row.full_qpe_rad

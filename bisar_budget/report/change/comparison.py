@@ -1,4 +1,7 @@
-"""Compare missions before and after a change: inputs, loosened rules, loss of margins, and a gate for them."""
+"""Compare missions before and after a change: inputs, loosened rules, loss of margins, and a gate.
+
+The gate refuses changes that use up too much of a margin or loosen a rule.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,7 +65,7 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
 
 
 def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
-    """Texts of the values in a mission file, by key path. A list of plain values gives one text.
+    """Texts of the values in a mission file, by key path. A list of plain values counts as one value.
 
     If a value comes from a catalogue part, its text also contains the name of the part.
     """
@@ -80,7 +83,7 @@ def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
 
 
 def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key path and text of each value that an option sets, whether or not the file has the key."""
+    """Yield the key path and text of each value that is set by an option, even if the file does not have the key."""
     changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
     for change in mission.changes:
         parts = parts_of(change.key)
@@ -138,9 +141,9 @@ _LIMITING_NUMBERS = (
 
 
 class Loosened(NamedTuple):
-    """A rule or declaration that became looser, with its text before and its text after the change.
+    """A rule or declaration that became looser, as text before and after the change.
 
-    `id` is the name for `--allow`: a key of the mission file, the id of a row, or the kind of an error.
+    `id` is the name to use with `--allow`: a key of the mission file, the id of a row, or the kind of an error.
     """
 
     id: str
@@ -149,12 +152,12 @@ class Loosened(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Text `before -> after` for the message of a gate."""
+        """Text `before -> after` for messages."""
         return f"{self.before} -> {self.after}"
 
 
 def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the rules and declarations that became looser. Both findings must contain their analysis."""
+    """Yield the rules and declarations that became looser. Both `before` and `after` must contain their analysis."""
     missions = (before.analysed().mission, after.analysed().mission)
     yield from _looser_requirements(*missions)
     yield from _looser_specifications(*missions)
@@ -171,7 +174,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
 
 
 def loosened_settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[Loosened]:
-    """Yield the settings of a project that became looser: `strict` was removed, or `exit-zero` was added."""
+    """Yield the settings of a project that became looser: a removed `strict`, or an added `exit-zero`."""
     for key, strict_value in (("strict", True), ("exit-zero", False)):
         old, new = (values.get(key, False) for values in (before, after))
         if old is strict_value and new is not strict_value:
@@ -198,7 +201,7 @@ def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Yield the entries of `requirements.declare` that no longer require all their kinds of error to be declared."""
+    """Yield the entries of `requirements.declare` whose errors no longer all have to be declared."""
     later_kinds = {kind for word in after.requirements.declare for kind in _owned(word)}
     for word in before.requirements.declare:
         kept = later_kinds.intersection(_owned(word))
@@ -217,8 +220,8 @@ def _owned(word: str) -> list[str]:
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
     """Yield the rules that became looser.
 
-    They are `n_pull` of the autofocus, the coverage factor, the warning threshold, the shares of the budget, the
-    gating model, and the rule that combines errors.
+    The rules are `n_pull` of the autofocus, the coverage factor, the warning threshold, the shares of the budget, the
+    gating model (which decides the verdicts), and the rule that combines errors.
     """
     missions = (before.analysed().mission, after.analysed().mission)
     for section, key, sign in _LIMITING_NUMBERS:
@@ -259,7 +262,8 @@ def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
 def _names_as_much(old: Waiver, new: Waiver) -> bool:
     """Whether an earlier waiver covers every row of a new waiver.
 
-    False if the patterns differ and the new one has brackets, because such patterns are not compared.
+    If the new pattern has brackets and differs from the earlier pattern, the result is False, because patterns with
+    brackets are not compared.
     """
     is_one_row = not any(char in new.id for char in "*?[")
     # A star of the old pattern also matches wildcards of the new pattern; the text beside the star is in both.
@@ -279,9 +283,9 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the errors that are no longer declared, or are declared as zero now.
+    """Yield the errors that are no longer declared, or are now declared as zero.
 
-    A motion error with all its axes is one error.
+    A motion error counts as a single error for all its axes.
     """
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
@@ -298,7 +302,10 @@ def _is_sum(row: Row) -> bool:
 
 
 def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:
-    """Yield the rows whose declared effect decreased, except rows of `gone_errors`, which are listed separately."""
+    """Yield the rows whose declared effect decreased, except rows of errors that are no longer declared.
+
+    `gone_errors` are the names of these errors, which are listed separately.
+    """
     for fall in fallen_effects(before, after):
         if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone_errors):
             yield Loosened(fall.id, *fall.words)
@@ -307,7 +314,7 @@ def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequen
 def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
     """Yield the distributions that became narrower.
 
-    For the same declared value a normal distribution is the widest and a uniform distribution the narrowest.
+    For the same declared value, a normal distribution is the widest, and a uniform distribution the narrowest.
     """
     sections = [
         (f"platforms.{name}.motion_error", attrgetter(f"platforms.{name}.motion_error")) for name in PLATFORMS
@@ -319,7 +326,7 @@ def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
 
 
 def _declared(findings: MissionFindings) -> dict[str, bool]:
-    """Map each declared error to whether it is nonzero along at least one axis.
+    """Map each declared error to True if it is nonzero along at least one axis, and to False otherwise.
 
     Levels in dB and computed sizes count as nonzero.
     """
@@ -333,14 +340,14 @@ def _declared(findings: MissionFindings) -> dict[str, bool]:
 
 
 def _error(row: Row) -> str:
-    """Name of the error of a row, without its axis."""
+    """Name of the error to which a row belongs, without the axis."""
     return row.id.rpartition(".")[0] if isinstance(row.subject.facts, StateKind) else row.id
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Yield the kinds of error that had a source before the change and have none after it.
+    """Yield the kinds of error whose source was stated before the change, but is no longer stated after it.
 
-    Errors with names of their own are listed one by one.
+    Errors with individual names are listed one by one.
     """
     had_source = set(before.kinds.declared) - set(before.kinds.without_source)
     lost = [
@@ -355,7 +362,7 @@ def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosen
 
 
 def _named_sources(mission: Mission) -> dict[str, str | None]:
-    """Source of each named error, by the id of its row."""
+    """Sources of the named errors, by the ids of their rows."""
     sources = {row_id: one.source for one in mission.other_errors for row_id in one.stated}
     for platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
@@ -384,7 +391,7 @@ SMALL_FRACTION = 0.01  # changes of a row below this fraction are not shown
 
 
 class Change(NamedTuple):
-    """A row before and after a change; `before` or `after` is None if that version has no such row."""
+    """A row before and after a change; `before` or `after` is None if that version does not have the row."""
 
     id: str
     before: Row | None
@@ -392,7 +399,7 @@ class Change(NamedTuple):
 
     @property
     def use(self) -> tuple[float, float]:
-        """Utilizations before and after; 0 if a row is missing or has no utilization."""
+        """Utilizations of the row before and after the change; 0 if the row is missing or has no utilization."""
         before, after = (row.utilization or 0.0 if row else 0.0 for row in (self.before, self.after))
         return before, after
 
@@ -419,7 +426,7 @@ class Change(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Text about the lost margin or the new status of the row, for the message of a gate."""
+        """Text for messages that states the lost margin or the new status of the row."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
@@ -429,22 +436,23 @@ class Change(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """Whether the status, declared value, allowable or utilization differs, or only one version has the row."""
+        """Whether the status, declared value, allowable or utilization changed, or only one version has the row."""
         return _reported(self.before) != _reported(self.after)
 
     @property
     def is_small(self) -> bool:
-        """Whether the status is the same, and declared value, allowable and margin change by less than 1 %."""
+        """Whether the status is unchanged, and declared value, allowable and margin changed by less than 1 %."""
         before, after = self.before, self.after
         if before is None or after is None or before.status != after.status or abs(self.erosion) >= SMALL_FRACTION:
             return False
         return _is_near(before.declared, after.declared) and _is_near(before.allowable, after.allowable)
 
     def breaks(self, tolerated: float) -> bool:
-        """Whether a gate refuses the change: the row newly fails, or loses more than the fraction `tolerated`.
+        """Whether a gate refuses the change, because the row newly fails or loses too much of its margin.
 
-        The fraction refers to the margin before the change, and only a judged row can lose margin. A row that is
-        waived before and after counts as judged, because the waiver was granted for its earlier value.
+        The row may lose at most the fraction `tolerated` of the margin that it had before the change. Only a judged
+        row can lose margin. A row that is waived before and after the change counts as judged, because the waiver was
+        granted for its earlier value.
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
@@ -454,8 +462,8 @@ class Change(NamedTuple):
 class RequirementMove(NamedTuple):
     """A requirement with its status before and after a change.
 
-    A status is None if that version of the mission has no such requirement. `requirement_ids` are the ids that the
-    project gives to the requirement.
+    A status is None if that version of the mission does not have the requirement. `requirement_ids` are the ids of
+    the requirement in the project.
     """
 
     key: str
@@ -479,7 +487,7 @@ class RequirementMove(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A change that a gate refuses: its id, a text about its effect, and whether `--allow` lets it through."""
+    """A change that a gate refuses, with its id and a text; `is_allowed` is True if `--allow` permits it anyway."""
 
     id: str
     words: str
@@ -487,20 +495,21 @@ class Refusal(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A gate that refuses changes: the largest fraction of a margin that a change may use up, and the exceptions.
+    """A gate that refuses changes which use up too much of a margin or loosen a rule.
 
-    `allowed` are the ids, or patterns of ids, that the gate lets through.
+    `tolerated` is the largest fraction of a margin that a change may use up. `allowed` are the ids, or patterns of
+    ids, of changes that are accepted nevertheless.
     """
 
     tolerated: float
     allowed: tuple[str, ...] = ()
 
     def only(self, allowed: str) -> "Gate":
-        """Return a copy of this gate that lets only the id or pattern `allowed` through."""
+        """Return a copy of this gate with `allowed` as its only exception, an id or a pattern."""
         return self._replace(allowed=(allowed,))
 
     def refusal(self, id: str, words: str, file: str) -> Refusal:
-        """Refusal of a change; it is let through if `id` or `file:id` equals or matches an item of `allowed`."""
+        """Make the refusal of a change; it is marked as allowed if `id` or `file:id` matches an item of `allowed`."""
         names = (id, f"{file}:{id}")
         return Refusal(
             id,
@@ -510,11 +519,11 @@ class Gate(NamedTuple):
 
 
 class MissionChange(NamedTuple):
-    """A mission before and after a change, and the differences.
+    """A mission before and after a change, and the differences between both versions.
 
-    `changes` are the changed rows: first the newly failing rows, then by erosion, the largest first. `unchanged` is
-    the number of other rows. `inputs` are the changed keys of the mission file, `requirements` the requirements whose
-    status changed, and `loosened` the rules and declarations that became looser.
+    `changes` are the changed rows: first the newly failing rows, then all further rows by erosion, the largest first.
+    `unchanged` is the number of unchanged rows. `inputs` are the changed keys of the mission file, `requirements` the
+    requirements whose status changed, and `loosened` the rules and declarations that became looser.
     """
 
     before: MissionFindings
@@ -527,11 +536,11 @@ class MissionChange(NamedTuple):
     loosened: tuple[Loosened, ...] = ()
 
     def broken(self, tolerated: float) -> list[Change]:
-        """Row changes that a gate refuses if a row may lose at most a fraction `tolerated` of its margin."""
+        """Row changes that a gate refuses if each row may lose at most the fraction `tolerated` of its margin."""
         return [change for change in self.changes if change.breaks(tolerated)]
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """Refusals of rows, requirements and loosened rules, including the ones that the gate lets through."""
+        """Refusals of changed rows, requirements and rules, including refusals overridden by `--allow`."""
         return [gate.refusal(id, words, self.after.file) for id, words in self._refused(gate.tolerated)]
 
     def _refused(self, tolerated: float) -> Iterator[tuple[str, str]]:
@@ -549,7 +558,8 @@ class ChangeSet(NamedTuple):
     """The effects of a change on all missions of a run.
 
     `gone` are the mission files that the change removes, `new` the mission files that it adds, and `settings` the
-    loosened settings of the project. `outside` are files outside of the repository, which have only one version.
+    loosened settings of the project. `outside` are files outside the repository; only their present versions are
+    available.
     """
 
     missions: tuple[MissionChange, ...]
@@ -559,16 +569,16 @@ class ChangeSet(NamedTuple):
     outside: tuple[str, ...] = ()
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """Refusals that concern no compared mission: removed mission files and loosened settings."""
+        """Refusals of changes outside the compared missions: removed mission files and loosened settings."""
         refusals = [gate.refusal(file, "the mission file is gone", file) for file in self.gone]
         return refusals + [gate.refusal(loosened.id, loosened.words, "pyproject.toml") for loosened in self.settings]
 
     def is_refused(self, gate: Gate) -> bool:
-        """Whether the gate refuses at least one change that `--allow` does not let through."""
+        """Whether the gate refuses at least one change that is not accepted by `--allow`."""
         return not all(refusal.is_allowed for refusal in self._all(gate))
 
     def unused(self, gate: Gate) -> list[str]:
-        """Patterns of `--allow` that do not match any refused change."""
+        """Patterns of `--allow` that do not match any refusal."""
         return [
             pattern
             for pattern in gate.allowed

@@ -1,7 +1,7 @@
-"""Find declared errors whose effect on the image decreased although their part and source have the same names.
+"""Find declared errors whose effect on the image decreased without a new catalogue part or source to justify it.
 
-Both versions are checked with the earlier geometry, waveform, aperture and requirements, so that a change of these
-does not count as a decrease.
+The errors before and after a change are both checked with the earlier geometry, waveform, aperture and requirements,
+so that changes of the geometry, waveform, aperture or requirements do not count as a decrease.
 """
 
 import math
@@ -67,9 +67,9 @@ class FallenEffect:
 
 
 class NotComparable(NamedTuple):
-    """A key of a changed error that is invalid with the earlier geometry and waveform, and the reason.
+    """A changed error that is invalid with the earlier geometry and waveform, given by its key and the reason.
 
-    Such a key prevents any comparison of effects.
+    Such an error prevents the comparison of effects.
     """
 
     id: str
@@ -77,15 +77,15 @@ class NotComparable(NamedTuple):
 
     @property
     def words(self) -> tuple[str, str]:
-        """Two texts: how effects are compared, and why this comparison is impossible for the key."""
+        """Two texts for a message: how effects are compared, and why this error cannot be compared."""
         return "effects compared in the earlier collection", f"not comparable, since there it {self.problem}"
 
 
 def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[FallenEffect | NotComparable]:
-    """List the rows whose declared effect decreased although their part and source have the same names.
+    """List the rows whose declared effect decreased although the names of their part and source are unchanged.
 
-    Sums are listed only if the effect of no single error decreased. If the later errors are invalid in the earlier
-    collection, the invalid keys are listed instead, because a gate must not pass what it cannot compare.
+    Sums are listed only if no single error has a smaller effect. If the later errors are invalid in the earlier
+    collection, the invalid keys are listed instead, because a gate must not accept a change that cannot be compared.
     """
     mission = _held_alike(before, after)
     if mission is None:
@@ -104,7 +104,7 @@ def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[
 
 
 def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | None:
-    """Return the earlier mission with the errors of the later one; None if this equals the later mission."""
+    """Return the earlier mission with the errors of the later mission, or None if this equals the later mission."""
     old, new = (findings.analysed().mission for findings in (before, after))
     split = MetricSplits(before.allocation.qpe, before.allocation.pslr, before.allocation.islr)
     mission = new._replace(
@@ -129,7 +129,7 @@ def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | No
 
 
 def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platform:
-    """Return a platform with its earlier path and its later errors.
+    """Return a platform with the path of its earlier version and the errors of its later version.
 
     Errors along `ric` axes need the direction from the Earth's centre. If the earlier file does not define this
     direction, it is derived from the scene `axes` of the later file.
@@ -141,7 +141,7 @@ def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platf
 
 
 def _misfits(mission: Mission) -> dict[KeyPath, str]:
-    """Map the key of each error that is invalid with the mission's geometry and waveform to the reason."""
+    """Map the key of each error that is invalid with the geometry and waveform of the mission to the reason."""
     problems = [(problem.at, problem.problem) for problem in Mission.problems(mission._asdict())]
     for name, platform in mission.platforms._asdict().items():
         problems += [
@@ -156,10 +156,10 @@ def _misfits(mission: Mission) -> dict[KeyPath, str]:
 
 
 def _errors(findings: MissionFindings, other: MissionFindings) -> list[Row]:
-    """Return the rows of declared errors.
+    """Return the rows of declared errors, for comparison with the rows in `other`.
 
-    If the other findings state a motion error along different axes, only its rows along the axes of the scene are
-    returned, because both findings have these.
+    A motion error may be stated along different axes in `findings` and in `other`. In this case only its rows along
+    the axes of the scene are returned, because both findings have these rows.
     """
     ids = {row.id for row in other.rows}
     elsewhere = {(row.owner, row.subject.kind) for row in findings.rows if row.is_independent and row.id not in ids}
@@ -185,7 +185,10 @@ def _sums(findings: MissionFindings) -> list[Row]:
 
 
 def _falls(before: Sequence[Row], after: Sequence[Row]) -> Iterator[FallenEffect]:
-    """Yield the rows whose effect decreased. Numbered entries of a list are paired by effect, not by number."""
+    """Yield the rows whose effect decreased.
+
+    Rows are paired by id. Numbered entries of a list are paired by the size of their effect, not by their number.
+    """
     now, then = defaultdict[tuple[str, ...], list[Row]](list), defaultdict[tuple[str, ...], list[Row]](list)
     for families, rows in ((then, before), (now, after)):
         for row in sorted(rows, key=_size, reverse=True):
@@ -203,15 +206,15 @@ def _size(row: Row) -> tuple[float, float]:
 def _tells(before: Row, after: Row | None) -> bool:
     """Whether the utilizations of a row before and after a change can be compared.
 
-    The earlier one must be positive. The later one must be known, unless the row is gone.
+    The earlier utilization must be positive. The later utilization must be known, unless the row no longer exists.
     """
     return bool(before.utilization) and (after is None or after.utilization is not None)
 
 
 def _is_less(before: Row, after: Row | None) -> bool:
-    """Whether the effect of a row decreased, or a row with an effect is gone.
+    """Whether the effect of a row decreased, or the row had an effect and no longer exists.
 
-    The effect is the utilization, or the declared value if the utilizations cannot be compared (`_tells`).
+    The effect is the utilization, or the declared value if the utilizations cannot be compared (see `_tells`).
     """
     if after is None:
         return before.declared != 0 or before.unit == "dB"
@@ -224,9 +227,10 @@ def _is_less(before: Row, after: Row | None) -> bool:
 
 
 def _family(row: Row) -> tuple[str, ...]:
-    """Key of the group within which rows are compared.
+    """Key of the group within which rows before and after a change are paired.
 
-    It is owner, kind and axis for a numbered list entry, and the row id for any other row.
+    The key of a numbered list entry consists of platform (or `mission`), kind and axis. The key of any other row is
+    its id.
     """
     subject = row.subject
     if subject.entry is None or not subject.facts.has_numbers:
@@ -237,8 +241,8 @@ def _family(row: Row) -> tuple[str, ...]:
 def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
     """Ids of the rows whose values have a source or part that the earlier file does not name for the row.
 
-    A key that was removed, or that overrides a part, does not name a new source. The source or part that its section
-    names already applied to the row.
+    If a key was removed, or overrides a value of a part, the row now has the source or part of its section. This does
+    not count as new, because it already applied to the row before.
     """
     old = {row.id: row for row in before.rows}
     old_mission, mission = before.analysed().mission, after.analysed().mission
@@ -254,9 +258,9 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
 
 
 def _source(mission: Mission, row: Row) -> str:
-    """Normalized name (`plain`) of the evidence for a row's values; empty if there is none.
+    """Name of the evidence for the values of a row, normalized by `plain`; empty if there is no evidence.
 
-    For a row about the fixes of a trajectory log, it is the name of the log file.
+    For a row about the fixes of a flight log, it is the name of the log file.
     """
     if not row.subject.facts.is_of_log:
         return plain(row.evidence)
@@ -267,8 +271,8 @@ def _source(mission: Mission, row: Row) -> str:
 def _is_named(source: str, mission: Mission, row: Row) -> bool:
     """Whether a mission already names `source` for a row, or for the section that contains the row's value.
 
-    It also counts if `source` begins with the name of a part whose values the section overrides. An empty source is
-    not a new one, and gives True.
+    The result is also True if `source` is empty, or begins with the name of a part whose values the section
+    overrides.
     """
     if source in ("", _source(mission, row)):
         return True
@@ -293,9 +297,9 @@ def _parts(mission: Mission, row: Row) -> set[str]:
 
 
 def _sensors(mission: Mission, row: Row) -> set[str]:
-    """Normalized names of the catalogue parts that the section of a row's platform names.
+    """Normalized names of the catalogue parts used for the motion errors and the oscillator of a row's platform.
 
-    They count even if the file overrides all their values.
+    A part is included even if the file overrides all its values.
     """
     if row.owner not in PLATFORMS:
         return set()

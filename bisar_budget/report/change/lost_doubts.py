@@ -1,9 +1,9 @@
-"""Find doubts about paths that a change removes although the declared errors stay the same.
+"""Find the doubts that a change removes without settling them, and without declaring larger errors.
 
-A path is in doubt if its source may have a larger error than the file declares: because of the accuracy that the
-source states, the age and interpolation of an orbit, or the noise of a log. Newer orbital elements or a better log
-resolve a doubt. A changed key that only suppresses the doubt does not resolve it, and neither does a source with the
-same name that now states a smaller error.
+There is a doubt about the path of a platform if the error of its source may be larger than the declared error. The
+reason may be the accuracy that the source states, the age and interpolation of an orbit, or the noise of a log. Newer
+orbital elements or a better log settle a doubt. A doubt is not settled by a changed key that only suppresses it, or
+by a source with the same name that now states a smaller error.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,10 @@ _NOT_OF_FORM = ("object", "planned")  # keys of an orbit other than the format o
 
 
 class LostDoubt(NamedTuple):
-    """A doubt that the change removed: the key that removed it, and texts for before and after."""
+    """A doubt about the path of a platform, removed by a change that does not settle it.
+
+    `key` is the key of the mission file that removed the doubt. `before` and `after` are texts about both versions.
+    """
 
     key: str
     before: str
@@ -28,7 +31,7 @@ class LostDoubt(NamedTuple):
 
 
 def lost_doubts(before: Mission, after: Mission) -> Iterator[LostDoubt]:
-    """Yield the doubts about the earlier paths that are gone, although the later errors do not cover them."""
+    """Yield the doubts that a change removed, although the errors declared after the change do not cover them."""
     doubts = {_name(doubt) for doubt in input_doubts(before)}
     if not doubts:
         return
@@ -54,7 +57,7 @@ def _words(doubt: InputDoubt) -> str:
 
 
 def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
-    """Yield the changed keys that suppress a doubt about a path, each with a text about its new value.
+    """Yield the changed keys of the mission file that suppress a doubt about a path, with texts about the new values.
 
     Nothing is yielded if the path has a new or better source.
     """
@@ -75,9 +78,10 @@ def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[st
 
 
 def _is_same_source(old: Platform, new: Platform) -> bool:
-    """Whether the source of a path has the same name as before. Format, folder and file ending are ignored.
+    """Whether the source of a path has the same name as before the change.
 
-    A selection within the file, such as its object or track, is compared only if both versions state it.
+    The format, folder and suffix of the file are ignored. Keys that select data within the file, such as an object or
+    a track, are compared only if both versions have them.
     """
     return _files(old) == _files(new) and all(
         plain(was) == plain(now) for was, now in zip(_chosen(old), _chosen(new), strict=True) if was and now
@@ -85,26 +89,26 @@ def _is_same_source(old: Platform, new: Platform) -> bool:
 
 
 def _files(platform: Platform) -> tuple[str, ...]:
-    """Normalized names of the file of a path and of its accuracy file; an empty tuple if the path has no file."""
+    """Normalized names of the path file of a platform and of its accuracy file; empty if there is no path file."""
     path = platform.path
     return () if path is None else (plain_file(path.file), plain_file(path.accuracy and path.accuracy[0]))
 
 
 def _chosen(platform: Platform) -> list[str]:
-    """Values of the keys that select data within a path file, such as `track`; an empty text for a missing key."""
+    """Values of the keys that select data within a path file, such as `track`; an empty string for a missing key."""
     choices = [getattr(getattr(platform, platform.way), choice, None) for choice in _CHOICES]
     return ["" if choice is None else str(choice) for choice in choices]
 
 
 def _key(platform: Platform) -> str:
-    """Key, within the section of a platform, that states its path: kind and format, such as `orbit.tle`."""
+    """Key that states the path of a platform within its section: kind and format, such as `orbit.tle`."""
     stated = getattr(platform, platform.way)
     form = next(key for key in stated._fields if key not in _NOT_OF_FORM and getattr(stated, key) is not None)
     return f"{platform.way}.{form}"
 
 
 def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
-    """Whether the declared error now names evidence that it did not name before."""
+    """Whether the evidence for the declared error is new, that is, not named in the earlier version."""
     named = plain(new.motion_error.evidence(doubt.kind))
     error = old.motion_error
     return named not in ("", plain(error.source), plain(error.evidence(doubt.kind)))

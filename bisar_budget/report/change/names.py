@@ -9,7 +9,7 @@ _NO_LETTER = re.compile(r"[\W_]+")
 
 
 def plain(name: str | None) -> str:
-    """Reduce a name to its letters and digits in lower case, without accents; None gives an empty text.
+    """Reduce a name to lower-case letters and digits without accents; None gives an empty string.
 
     Blanks or punctuation between two digits become a point, so that revision 1.1 differs from revision 11.
     """
@@ -19,5 +19,5 @@ def plain(name: str | None) -> str:
 
 
 def plain_file(name: str | None) -> str:
-    """Reduce the name of a file as `plain` does, without folder and ending, so that a moved copy keeps its name."""
+    """Reduce a file name as in `plain`, without folder and suffix, so that a moved copy keeps its name."""
     return plain(os.path.splitext(os.path.basename(name or ""))[0])

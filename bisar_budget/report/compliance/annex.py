@@ -1,6 +1,7 @@
 """The annex of a compliance report.
 
-It has the sweep, images and Monte Carlo draws that were requested, and with `--detail full` all rows.
+It contains the sweep, images and Monte Carlo draws that were requested. With `--detail full`, it also contains all
+rows.
 """
 
 import math
@@ -47,7 +48,7 @@ _MAX_LISTED_WORDS = 6  # words of an axis that a sentence lists
 
 
 def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
-    """Return the annex chapter of a mission in a list; the list is empty if the summary already shows everything."""
+    """Return the annex of a mission as a list with one chapter; the list is empty if the annex would be empty."""
     findings = page.findings
     sections = [] if findings.study is None else [_studied(page, findings.study)]
     if findings.sheet is not None:
@@ -74,7 +75,7 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
 
 # ---------------------------------------------------------------------- specifications
 def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    """Yield the specification sheet of a mission, with the number of declared errors larger than specified."""
+    """Yield the specification sheet of a mission, and the number of declared errors above their specification."""
     outside = sum(spec.declared is not None and not spec.holds(spec.declared) for spec in sheet.specifications)
     silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
     clauses = list[str]()
@@ -90,7 +91,7 @@ def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- a sweep
 def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
-    """Return the chapter of a sweep: its question, the command that reproduces it, a drawing and a table."""
+    """Return the chapter about a sweep: its question, a drawing, a table, and the command that reproduces it."""
     findings, trade = page.findings, study.trade
     by_word = per_word(trade)
     counts, question = _counts(study), _question(trade)
@@ -136,7 +137,7 @@ def _question(trade: Trade) -> str:
 
 
 def _values(axis: Axis) -> str:
-    """Describe the values of a sweep axis: its words, or for numbers their count, the first and the last."""
+    """Describe the values of a sweep axis: the words, or the number of values with the first and the last value."""
     count = len(axis.values)
     if axis.words:
         word_list = ", ".join(map(printable, axis.words[:_MAX_LISTED_WORDS]))
@@ -164,7 +165,7 @@ def _counts(study: TradeStudy) -> str:
 
 
 def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
-    """Write the command line that repeats the sweep and writes its cases as a table and a plot."""
+    """Write the command line that repeats a sweep and stores its cases in a table and a plot."""
     analysed = findings.analysed().mission
     words = ["bisar-budget sweep", quote(printable(file))]
     words += [f"--vary {quote(printable(text))}" for text in study.asked]
@@ -175,10 +176,10 @@ def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
 
 
 def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
-    """Yield the table lines of a sweep over one axis, each with a sentence about it.
+    """Yield the lines of the table of a sweep over one axis, each with a sentence about the line.
 
-    Neighbouring numbers with the same status and the same worst row share a line. A value that is a word has its own
-    line. The binding requirement follows the name of the row, unless the name ends with it.
+    Neighbouring numerical values with the same status and the same worst row share a line. A value that is a word has
+    its own line. The binding requirement is written after the name of the row, unless the name ends with it.
     """
     (axis,) = trade.axes
     status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
@@ -195,7 +196,7 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
 
 
 def _uses(uses: NumbersOrWords) -> str:
-    """Text of the range of finite utilizations, from the lowest to the highest; a dash if none is finite."""
+    """Text with the range of the finite utilizations, from lowest to highest; a dash if no utilization is finite."""
     finite_uses = sorted(float(use) for use in uses if math.isfinite(use))
     if not finite_uses:
         return "–"
@@ -204,10 +205,10 @@ def _uses(uses: NumbersOrWords) -> str:
 
 
 def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
-    """Yield the table lines of a sweep over two axes, each with a sentence about it.
+    """Yield the lines of the table of a sweep over two axes, each with a sentence about the line.
 
-    If one axis has words as values, each line counts the cases of one word. Otherwise each line counts the cases with
-    one worst row, and the line with the most cases comes first.
+    If one axis has words as values, each line counts the cases with one of the words. Otherwise, each line counts the
+    cases with the same worst row, and the line with the most cases comes first.
     """
     cases: dict[str, Mapping[str, NumbersOrWords]] = {printable(word): each.values for word, each in by_word.items()}
     if not by_word:
@@ -228,7 +229,7 @@ def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple
 
 # ---------------------------------------------------------------------- images
 def _evidence(page: Page) -> Iterator[doc.Block]:
-    """Yield the chapter blocks that compare image measurements at the limits with the predictions."""
+    """Yield the blocks of the chapter that compares predictions with measurements in images at the limits."""
     verdicts = page.findings.verdicts or ()
     yield doc.Paragraph(
         "Each error was set to its limit in data simulated from exact ranges, and the phase was measured in the "
@@ -277,7 +278,7 @@ def _heads(*heads: str) -> list[doc.Head]:
 
 
 def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
-    """Return the images of a row at its limit, with the cuts through them."""
+    """Return the images that were formed for a row at its limit, with the cuts through them."""
     row_id = evidence.verdict.id
     subject = f"{row_id} at the limit with autofocus"
     point_images = [("limit", f"{row_id} at the limit", "At the limit", evidence.at_limit)]
@@ -301,7 +302,7 @@ def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
 
 
 def _page_size(image: PointImage) -> tuple[int, int]:
-    """Width and height of an image on a page [px], reduced to at most 240 each."""
+    """Width and height of an image on a page, each reduced to at most 240. [px]"""
     width, height = chip_size(image)
     shrink = max(1.0, width / 240, height / 240)
     return max(1, round(width / shrink)), max(1, round(height / shrink))
@@ -310,7 +311,7 @@ def _page_size(image: PointImage) -> tuple[int, int]:
 # ---------------------------------------------------------------------- draws
 # ---------------------------------------------------------------------- all rows
 def _rows(page: Page) -> Iterator[doc.Block]:
-    """Yield the rows and contributions that the summary leaves out, and the remarks of all rows."""
+    """Yield the rows and contributions that are not in the summary, and the remarks on all rows."""
     if page.hidden:
         yield matrix_table(page, page.hidden, f"Other rows of {page.name}", "Rows that are not in the summary")
     if page.undeclared and page.matrix:
@@ -348,7 +349,7 @@ def _sources(page: Page) -> Iterator[doc.Block]:
 
 
 def _formulas(page: Page) -> Iterator[doc.Block]:
-    """Yield the derivations of all rows with their numbers, and then the general formulas."""
+    """Yield the derivations of all rows with their numbers, followed by the general formulas."""
     findings = page.findings
     mission = page.mission._replace(file=page.file)  # every section writes the same path
     yield doc.Paragraph(

@@ -14,9 +14,9 @@ _MAX_NAMED_MISSION_COUNT = 3  # of a requirement that is not evaluated
 
 
 class OverviewEntry(NamedTuple):
-    """A mission in the overview: its name, the anchor of its chapter, its file, its status, and its findings.
+    """A mission in the overview: its name, the anchor of its chapter, its file, status and findings.
 
-    The findings are None for a file that cannot be used; `faults` is then the text with the number of its faults.
+    If the mission file is unusable, `findings` is None, and `faults` is a text with the number of faults.
     """
 
     name: str
@@ -27,13 +27,13 @@ class OverviewEntry(NamedTuple):
     faults: str = ""
 
     def requirement(self, key: str) -> JudgedRequirement | None:
-        """The judged requirement with a key; None if the mission does not have it."""
+        """The judged requirement with the key `key`; None if the mission does not have this requirement."""
         requirements = () if self.findings is None else self.findings.requirements
         return next((requirement for requirement in requirements if requirement.key == key), None)
 
 
 def overview(entries: Sequence[OverviewEntry]) -> doc.Chapter:
-    """Return the first chapter of a report on several missions."""
+    """Return the overview chapter, the first chapter of a report on several missions."""
     stated = [key for key in REQUIREMENT_NAMES if any(entry.requirement(key) for entry in entries)]
     columns = doc.heads("Mission", "Status", *(sentence(REQUIREMENT_NAMES[key]) for key in stated))
     caption = (
@@ -50,7 +50,7 @@ def overview(entries: Sequence[OverviewEntry]) -> doc.Chapter:
 
 
 def _line(entry: OverviewEntry, keys: Sequence[str]) -> doc.Line:
-    """Line of a mission, with a cell for each requirement of `keys`."""
+    """Table line of a mission, with a cell for each requirement in `keys`."""
     name: list[doc.Text] = [doc.Name(entry.name, entry.anchor), doc.Styled("own-id", doc.Name(entry.file))]
     status: list[doc.Text] = [doc.Badge(entry.status)]
     if entry.findings is None:
@@ -61,7 +61,7 @@ def _line(entry: OverviewEntry, keys: Sequence[str]) -> doc.Line:
 
 
 def _cell(requirement: JudgedRequirement | None) -> doc.Text:
-    """Use and status of a requirement; a dash if the mission does not have it."""
+    """Table cell with the utilization and status of a requirement; a dash if the mission does not have it."""
     if requirement is None:
         return "–"
     use = use_words(_use(requirement))

@@ -1,4 +1,4 @@
-"""Chapter about the document of a mission: change record, git repository, and all files that the mission read."""
+"""Chapter on the document of a mission: its change record, the git repository, and all files read for the mission."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ def document_facts(document: Document, work_tree: WorkTree | None) -> Iterator[t
 
 
 def commit_words(work_tree: WorkTree) -> doc.Text:
-    """Text with the commit of a git repository, and whether its files are as committed."""
+    """Text with the current commit of a git repository, and whether files have changed since this commit."""
     if not work_tree.commit:
         return work_tree.reason
     clauses = []
@@ -41,13 +41,13 @@ def commit_words(work_tree: WorkTree) -> doc.Text:
 
 
 def _named(files: tuple[str, ...]) -> str:
-    """Names of a few files, and the number of the others."""
+    """Text with the names of the first files, and the number of further files."""
     unlisted_count = len(files) - _LISTED_FILE_COUNT
     return ", ".join(files[:_LISTED_FILE_COUNT]) + (f" and {unlisted_count} more" if unlisted_count > 0 else "")
 
 
 def record(page: Page) -> doc.Chapter:
-    """Return the chapter with the change record of the document, and all inputs with their SHA-256."""
+    """Return the chapter with the change record of the document, and a table of all inputs with their SHA-256."""
     blocks: list[doc.Block] = []
     if changes := page.mission.document.changes:
         lines: list[doc.Line] = [(change.issue, change.date.isoformat(), change.what) for change in changes]
@@ -60,7 +60,10 @@ def record(page: Page) -> doc.Chapter:
 
 
 def has_record(page: Page) -> bool:
-    """Whether the record of a mission has more than its mission file, whose SHA-256 is at the head of its chapter."""
+    """Whether the document record of a mission has any content besides the mission file.
+
+    The mission file alone needs no record, because its SHA-256 is stated at the head of the chapter on the mission.
+    """
     return bool(page.mission.document.changes) or len(input_files(page.mission)) > 1
 
 

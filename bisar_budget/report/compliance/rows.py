@@ -1,4 +1,4 @@
-"""Tables about the rows of a mission: the compliance matrix, and contributions to phase and displacement."""
+"""Tables of the rows of a mission: the compliance matrix, and the contributions to phase and displacement."""
 
 import math
 from collections import Counter
@@ -39,11 +39,11 @@ _MAX_BRIEF_ROWS = 6  # rows in the summary of one of several missions
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Page:
-    """The findings about a mission that all sections of its report use.
+    """The findings about a mission that are used by all sections of its report.
 
-    `file` is the path of the mission file as the report shows it. `anchor` identifies the mission within the report.
-    `matrix` are all rows except undeclared errors, worst first. `in_summary` are the ids of the rows that a summary
-    shows. `is_brief` is True for a mission among several, of which the report shows less.
+    `file` is the path of the mission file as shown in the report. `anchor` identifies the mission within the report.
+    `matrix` has all rows except undeclared errors, worst first. `in_summary` has the ids of the rows in the summary.
+    `is_brief` is True in a report on several missions, which shows fewer rows of each.
     """
 
     findings: MissionFindings
@@ -68,7 +68,7 @@ class Page:
 
     @property
     def number(self) -> str:
-        """Number of the mission in the report, from 1. The names of its pictures begin with it."""
+        """Number of the mission in the report, counted from 1. The file names of its pictures begin with it."""
         return self.anchor[1:]
 
     @property
@@ -78,12 +78,12 @@ class Page:
 
     @property
     def hidden(self) -> list[Row]:
-        """Rows of the matrix that a summary leaves out."""
+        """Rows of the matrix that are not in the summary."""
         return [row for row in self.matrix if row.id not in self.in_summary]
 
 
 def page_of(findings: MissionFindings, style: Style, anchor: str, *, is_brief: bool = False) -> Page:
-    """Return the page of a mission; a brief page has fewer rows.
+    """Collect the findings for the report on a mission; a brief report has fewer rows.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def undeclared_table(page: Page) -> doc.TextTable:
 
 
 def grouped(row_texts: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
-    """Group row ids by text: each text appears once, with the ids of all rows that have it; None without texts."""
+    """Group row ids by text: each text appears once, with the ids of all its rows. None if there are no texts."""
     groups: dict[str, list[str]] = {}
     for row_id, texts in row_texts:
         if texts:
@@ -168,14 +168,14 @@ def all_remarks(page: Page) -> Iterator[tuple[str, Sequence[str]]]:
 
 
 def limit_words(value: float, unit: str) -> str:
-    """Write a limit, rounded down to three digits. All limits of a page are written by this function."""
+    """Write a limit with three digits, rounded down. All limits of a report are written by this function."""
     return format_quantity(value, unit, 3, "down")
 
 
 def margin(row: Row) -> str:
     """Write the margin of a row: allowable/declared − 1 in percent, or the difference of levels in dB.
 
-    It is rounded down. Above 1000 %, the ratio allowable/declared is written instead.
+    The margin is rounded down. Above 1000 %, the ratio allowable/declared is written instead.
     """
     if row.margin is None:
         return "–"
@@ -193,7 +193,7 @@ def margin(row: Row) -> str:
 
 
 def _down(value: float) -> float:
-    """Round down to three digits, with a tolerance of one part in 10¹² so that exact numbers stay the same."""
+    """Round down to three digits, with a tolerance of one part in 10¹² so that exact numbers are not changed."""
     step = 2 - math.floor(math.log10(abs(value)))
     return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
 
@@ -248,10 +248,10 @@ def method(row: Row, verdict: str | None) -> str:
 # ---------------------------------------------------------------------- contributions
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """Effect of one declared error. `fraction` is its size relative to the largest effect.
+    """Effect of one declared error on the phase or the position of the image.
 
-    `model_cells` are additional table cells for a phase: its share of the sum, and its values by the published and
-    the full model.
+    `fraction` is its size relative to the largest effect. `model_cells` are additional table cells for a phase: its
+    share of the sum, and its values by the published and the full model.
     """
 
     id: str
@@ -262,12 +262,12 @@ class Contribution:
 
     @property
     def kind(self) -> SourceKind:
-        """The kind of the error."""
+        """The kind of error that causes the effect."""
         return self.subject.source_kind
 
     @property
     def owner(self) -> str:
-        """Owner of the error: a platform, both platforms, the clock or the mission."""
+        """Name of the platform to which the error belongs, or `both platforms`, `clock` or `mission`."""
         is_common = self.kind.is_shared and self.subject.owner == "mission"
         return "both platforms" if is_common else self.subject.owner
 
@@ -280,9 +280,10 @@ class Contribution:
 def phase_contributions(page: Page) -> list[Contribution]:
     """List the quadratic phase that each declared error causes by itself, largest first.
 
-    The quadratic phase is that of equal peak loss, which includes the hidden phase. Each contribution has its share
-    of the sum of all phases, and its values by the published and the full model. An error that is too large for an
-    image has an infinite phase and comes first. The sum is then infinite, and no contribution has a share.
+    The phase includes the hidden phase: it is the quadratic phase that would cause the same peak loss as the
+    quadratic and the hidden phase together. Each contribution has its share of the sum of all phases, and its values
+    by the published and the full model. An error that is too large to form an image has an infinite phase, and comes
+    first. The sum is then infinite, and no contribution has a share.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
@@ -309,7 +310,7 @@ def _phase(value: float, findings: MissionFindings) -> str:
 
 
 def displacement_contributions(page: Page) -> list[Contribution]:
-    """Displacements of the image by the declared errors, largest first."""
+    """List the displacements of the image that are caused by the declared errors, largest first."""
     displacements = {row.id: row.displacement_m for row in page.findings.rows}
     subjects = [error.subject for error in page.analysis.stated]
     subjects += [error.subject for error in page.analysis.random if error.declared is not None]
@@ -346,7 +347,7 @@ def largest_contributions(page: Page) -> Iterator[doc.Block]:
 
 
 def _largest(page: Page, contributions: Sequence[Contribution], name: str, head: str, caption: str) -> doc.TextTable:
-    """Make the table of the largest contributions to the phase or to the displacement."""
+    """Make the table of the largest contributions to the phase or the displacement."""
     sum_heads = doc.numbers("Share of the sum") if any(error.model_cells for error in contributions) else []
     size = doc.Head(head, "number")
     columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *sum_heads)
@@ -390,7 +391,7 @@ def all_contributions(page: Page) -> Iterator[doc.Block]:
 
 
 def verification_words(findings: MissionFindings, requirement: JudgedRequirement) -> str:
-    """Text on how this run verified a requirement: by analysis, by images at limits, by Monte Carlo draws."""
+    """Text on how this run verified a requirement: by analysis, by images at limits, or by Monte Carlo draws."""
     if requirement.is_unjudged:
         return "none"
     methods = ["analysis"]
@@ -406,9 +407,9 @@ def verification_words(findings: MissionFindings, requirement: JudgedRequirement
 
 
 class Declaration(NamedTuple):
-    """Kinds of error that one platform, the clock or the mission declares from one source.
+    """Kinds of error with the same source, declared for the same platform, for the clock or for the mission.
 
-    `source` is None if the file names none; `owes_source` tells whether it should.
+    `source` is None if the file does not name a source. `owes_source` states whether a source is required.
     """
 
     owner: str
@@ -418,7 +419,7 @@ class Declaration(NamedTuple):
 
 
 def declared_by_owner(findings: MissionFindings) -> list[Declaration]:
-    """List the declared errors by their owner and source, in the order of the rows."""
+    """List the declared errors by platform (or clock or mission) and source, in the order of the rows."""
     kinds: dict[tuple[str, str | None, bool], dict[str, None]] = {}
     for row in findings.rows:
         kind = row.subject.facts

@@ -1,4 +1,4 @@
-"""The compliance report of a run: an index of missions, a summary of each, options, signatures, and the annexes."""
+"""The compliance report of a run: an index and summaries of the missions, options, signatures, and annexes."""
 
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
@@ -102,7 +102,7 @@ def compliance(report: Report, style: Style) -> doc.AnswerDocument:
     Raises
     ------
     ValueError
-        Findings do not contain their analysis.
+        The findings do not contain their analysis.
     """
     count = len(report.missions)
     is_brief = count > 1 and style.detail != "full"
@@ -145,13 +145,13 @@ _WAIVED = (
 
 
 def _judged(status: str, waived: Sequence[int]) -> str:
-    """Text of the verdict for a status, followed by the counts of waived rows in `waived` (from `_waived`)."""
+    """Text of the verdict for a status, followed by the two numbers in `waived`, as counted by `_waived`."""
     clauses = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
     return "; ".join([STATUS[status].verdict, *clauses])
 
 
 def _waived(findings: MissionFindings) -> tuple[int, int]:
-    """Count the waived rows over their limit, and the waived rows and requirements that cannot be judged.
+    """Count the waived rows above their limits, and the waived rows and requirements that cannot be judged.
 
     A waived requirement is counted only if none of its rows is waived.
     """
@@ -161,7 +161,7 @@ def _waived(findings: MissionFindings) -> tuple[int, int]:
 
 
 def _overall(report: Report) -> str:
-    """Text of the verdict on the run. Missions without declared errors are counted separately, as not judged."""
+    """Text of the verdict on the run. Missions without declared errors are counted separately as not judged."""
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     count = len(report.missions)
     empty = sum(mission.is_empty and not mission.changes for mission in usable)
@@ -181,12 +181,12 @@ def _overall(report: Report) -> str:
 
 
 def _judges_each_alone(findings: MissionFindings) -> bool:
-    """Whether each error of a mission is judged alone, without a combination with other errors."""
+    """Whether each error of a mission is judged alone, so that errors are not combined."""
     return not findings.is_empty and findings.combine == "each"
 
 
 def _counts(findings: MissionFindings) -> str:
-    """Text with the number of rows of each status, and with the waivers."""
+    """Text with the number of rows of each status, and the waivers."""
     counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in findings.summary.items())
     waivers = [waiver.id for waiver in findings.waived_by]
     return f"{counts}; {waiver_names(waivers)}" if waivers else counts
@@ -209,7 +209,7 @@ def _provenance(report: Report) -> doc.Chapter:
 
 
 def _approval(report: Report) -> doc.Chapter:
-    """Return the chapter for signatures, with a table of data sheet values that a stated level shifts."""
+    """Return the chapter for signatures, and a table of the data-sheet spectra that a mission file shifts."""
     blocks: list[doc.Block] = []
     shifted = [
         (findings.name, doc.Styled("id", doc.Name(error.key)), error.level, error.off)
@@ -268,7 +268,7 @@ def _summary(page: Page) -> list[doc.Block]:
 
 
 def _brief(page: Page) -> list[doc.Block]:
-    """Return the chapters of a mission in a report on several: verdict, worst rows, geometry in words, inputs."""
+    """Return the blocks about one of several missions: verdict, worst rows, geometry in words, inputs."""
     command = f"bisar-budget check {quote(page.file)} --report report.html"
     more = ("Contributions, drawings, allocation and assumptions: ", doc.Code(command), ".")
     return [
@@ -316,7 +316,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
 
 
 def _requirements(page: Page) -> doc.TextTable:
-    """Make the table of requirements; it has a column for the ids of the project if the file gives any."""
+    """Make the table of requirements, with a column for project ids if the file states any."""
     lines: list[doc.Line] = []
     has_ids = any(requirement.requirement_ids for requirement in page.findings.requirements)
     for line in requirement_lines(page.findings):
@@ -345,7 +345,7 @@ def _requirements(page: Page) -> doc.TextTable:
 
 
 def _declarations(page: Page) -> Iterator[doc.Block]:
-    """Yield the table that says which errors each platform declares, and from which source."""
+    """Yield the table of the errors that are declared for each platform, with their sources."""
     declarations = declared_by_owner(page.findings)
     if not declarations:
         return
@@ -364,8 +364,9 @@ def _source(declaration: Declaration) -> doc.Text:
 def _drivers(page: Page) -> Iterator[Row]:
     """Yield the rows that decide the verdict.
 
-    They are the rows that fail, warn, cannot be judged or are waived. If all rows are met, they are the rows with the
-    largest utilization, which a brief page shows only in its matrix.
+    These are the rows that fail, warn, cannot be judged or are waived. If all limits are met, they are the rows with
+    the largest utilization. In a brief report, the rows with the largest utilization appear only in the compliance
+    matrix.
     """
     is_met = STATUS[page.findings.status].is_met and not page.is_brief
     for row in page.judged[:_MAX_DRIVER_ROWS]:
@@ -426,7 +427,7 @@ def _geometry(page: Page) -> Iterator[doc.Block]:
 
 
 def _allocation(page: Page) -> Iterator[doc.Block]:
-    """Yield the paragraphs and tables with the shares of the quadratic phase error and of the power."""
+    """Yield the paragraphs and tables about the shares of the quadratic phase error and of the power budget."""
     findings, allocation = page.findings, page.findings.allocation
     total, gain = allocation.qpe_total, allocation.autofocus_gain
     yield doc.Paragraph(
@@ -457,7 +458,7 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
 
 
 def _power_shares(page: Page) -> Iterator[doc.TextTable]:
-    """Yield the table with the shares of the power that vibration and noise may add.
+    """Yield the table with the power that vibration and noise may add, divided into shares of the platforms.
 
     The clock has a column only if it has a share.
     """
@@ -509,7 +510,7 @@ def _validity(page: Page) -> Iterator[doc.Block]:
 
 
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of the assumptions behind the verdict, including its range of validity."""
+    """Yield the names and texts of the assumptions behind the verdict, including the range of validity."""
     mission, findings = page.mission, page.findings
     if findings.changes:
         yield "Mission", f"the mission of the file, changed by {changes_words(findings.changes)}"
@@ -591,7 +592,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
 
 
 def _air_of(propagation: Propagation) -> str:
-    """Text about the delays in the air: whether they are the same on both legs, and how fast they change."""
+    """Text about the atmospheric delays: whether they are the same for both platforms, and how fast they change."""
     legs = {name: propagation.leg(name) for name in Platforms._fields}
     times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
     change_words = {
@@ -607,7 +608,7 @@ def _air_of(propagation: Propagation) -> str:
 
 
 def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
-    """Yield name, value and origin of the inputs that determine the findings.
+    """Yield the name, value and origin of each input that determines the findings.
 
     The origin is a line of the file, `default` or `--set`.
     """

@@ -1,1 +1,1 @@
-"""Drawings of missions (SVG) and of images."""
+"""Drawings of missions as SVG, and drawings of images."""

@@ -15,7 +15,7 @@ WITHOUT_ERROR, WITH_ERRORS, FOCUSED = "line dotted", "line receiver dashed", "li
 
 
 class Curve(NamedTuple):
-    """A cut along y′: positions [m], levels relative to the error-free peak [dB], and the style of its line."""
+    """A cross-range cut along y′: positions [m], levels relative to the error-free peak [dB], and the line style."""
 
     name: str
     positions: Sequence[float]
@@ -24,9 +24,9 @@ class Curve(NamedTuple):
 
 
 def impulse_response_cuts(evidence: ImageEvidence) -> str:
-    """Draw the cross-range cuts of a row at its limit as SVG, together with the cut without error.
+    """Draw the cross-range cuts for an error at its limit as SVG, together with the cut without the error.
 
-    Cuts with autofocus are in a second panel.
+    Cuts after autofocus are in a second panel.
     """
     verdict = evidence.verdict
     canvas = svg.Canvas()
@@ -60,7 +60,7 @@ def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Cur
 
 
 def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
-    """Yield sentences with the predicted and the measured values at each limit."""
+    """Yield sentences with the predicted and the measured values at a limit, also with autofocus."""
     verdict = evidence.verdict
     yield f"{_at_limit(verdict)}."
     measures = (
@@ -77,9 +77,10 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
 
 
 def chip_png(image: PointImage) -> bytes:
-    """Write a chip as an 8-bit grey PNG with x′ to the right and y′ up. Black is 40 dB below the error-free peak.
+    """Write a chip (small image) as an 8-bit grey PNG with x′ to the right and y′ up.
 
-    The data is stored without compression, so that the bytes do not depend on a compression library.
+    Black is 40 dB below the error-free peak. The data are stored without compression, so that the bytes do not depend
+    on a compression library.
     """
     lines = (image.chip[row * image.columns : (row + 1) * image.columns] for row in range(image.rows))
     header = struct.pack(">IIBBBBB", image.columns, image.rows, 8, 0, 0, 0, 0)
@@ -91,7 +92,7 @@ def chip_png(image: PointImage) -> bytes:
 
 
 def chip_caption(image: PointImage) -> str:
-    """Text about the size, orientation and grey scale of a chip."""
+    """Text about the size, orientation and grey scale of a chip (small image)."""
     along, across = (format_quantity(side, "m") for side in image.extent_m)
     return (
         f"{along} along x′ (look, to the right) by {across} along y′ (cross-range, up); "
@@ -100,9 +101,9 @@ def chip_caption(image: PointImage) -> str:
 
 
 def chip_size(image: PointImage, pixels_per_sample: int = 3) -> tuple[int, int]:
-    """Width and height of a chip on a page, such that its resolution cells are square. [px]
+    """Width and height at which a chip (small image) is shown, so that its resolution cells are square. [px]
 
-    A chip to scale would be a narrow strip, because a cell may be ten times as long as it is wide.
+    A chip drawn to scale would be a narrow strip, because a cell may be ten times as long as it is wide.
     """
     return image.columns * pixels_per_sample, image.rows * image.thinned * pixels_per_sample
 
@@ -135,7 +136,7 @@ def _phase(value: float | None) -> str:
 def cut_panel(
     canvas: svg.Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]
 ) -> float:
-    """Draw cuts on a panel with its title above. Returns the y coordinate of the bottom of the panel. [px]"""
+    """Draw cross-range cuts on a panel with a title; return the y coordinate of the bottom of the panel. [px]"""
     frame = svg.Box(_CUTS_LEFT_PX, top + _CUTS_TITLE_PX, width - _CUTS_EDGE_PX, top + _CUTS_TITLE_PX + height)
     positions = [position for curve in curves for position in curve.positions]
     across = svg.Scale(min(positions), max(positions), frame.left, frame.right)

@@ -39,7 +39,10 @@ def figure_file(figure: "Figure", file_type: str, dpi: int = 110) -> bytes:
 
 
 def drawing_file(svg: str, file_type: str, dpi: int = 192) -> bytes:
-    """Convert an `svg.Canvas` drawing to a `png`, `svg` or `pdf` file. PNG and PDF have a white background."""
+    """Convert an SVG drawing made with `svg.Canvas` to a `png`, `svg` or `pdf` file.
+
+    PNG and PDF have a white background.
+    """
     if file_type == "svg":
         return svg.encode()
     drawing = ElementTree.fromstring(svg)
@@ -50,7 +53,7 @@ def drawing_file(svg: str, file_type: str, dpi: int = 192) -> bytes:
 
 
 def paint(panel: "Axes", drawing: ElementTree.Element) -> None:
-    """Paint the elements of a `svg.Canvas` drawing on Matplotlib axes that are as large as the drawing."""
+    """Draw the elements of an SVG drawing from `svg.Canvas` on Matplotlib axes of the same size as the drawing."""
     from matplotlib.patches import Circle, PathPatch
     from matplotlib.patheffects import withStroke
 
@@ -105,7 +108,10 @@ def paint(panel: "Axes", drawing: ElementTree.Element) -> None:
 
 
 def _rules(css: str) -> list[tuple[str, Mapping[str, str]]]:
-    """CSS selectors of a drawing and their declarations, strongest last. Rules for dark screens are left out."""
+    """List the CSS rules of a drawing, each as a selector with its declarations, in order of increasing priority.
+
+    Rules for dark screens are left out.
+    """
     css = re.sub(r"@media[^{]*\{[^{}]*\{[^{}]*\}\}", "", css)
     css = re.sub(r"var\(--\w+,(#\w+)\)", r"\1", css)
     rules = []
@@ -129,7 +135,7 @@ def _colour(name: str, opacity: str | None) -> tuple[str, float] | str:
 
 
 def _path(data: str) -> "Path":
-    """Convert the path data of a `svg.Canvas`, with absolute commands M, L, H, V and Z, to a Matplotlib path."""
+    """Convert SVG path data from `svg.Canvas`, with absolute commands M, L, H, V and Z, to a Matplotlib path."""
     from matplotlib.path import Path
 
     codes, points = [], [(0.0, 0.0)]

@@ -1,7 +1,8 @@
 """Draw the collection to scale as SVG, from above and from the side.
 
-Objects that would coincide at this scale are enlarged in a second panel below. Examples are a receiver next to the
-scene of a satellite, or two satellites in close formation. The text description of each drawing contains its numbers.
+Objects that would coincide at this scale are shown enlarged in a second panel below. Examples are a receiver on the
+ground next to the scene while the transmitter is a satellite, and two satellites in close formation. The text
+description of each drawing contains the same numbers.
 """
 
 import math
@@ -38,8 +39,8 @@ _PLAN, _SIDE = ((210.0, 400.0), (74.0, 66.0, 66.0)), ((130.0, 360.0), (82.0, 52.
 class _Platform(NamedTuple):
     """A platform in one view.
 
-    `heading` is the projection of the unit velocity on the drawing plane; `toward` is its component towards the
-    viewer.
+    `heading` is the projection of the unit vector of the velocity onto the drawing plane, and `toward` is the
+    component of this vector towards the viewer.
     """
 
     name: str
@@ -69,14 +70,15 @@ class _View(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """Radius of the scene; 0 if the file states none. [m]"""
+        """Radius of the scene; 0 if the file does not state the radius. [m]"""
         return self.findings.scene_radius or 0.0
 
 
 def geometry_plan(findings: MissionFindings) -> str:
     """Draw the collection from above as SVG.
 
-    The drawing has platforms, velocities, lines of sight, the look direction φ_b of (11) and the smear of (31).
+    The drawing shows platforms, velocities, lines of sight, the look direction φ_b of equation (11), and the smear
+    direction of equation (31).
     """
     platforms = [
         _seen(name, state, findings, lambda vector: (vector[0], vector[1]), _direction(state.velocity)[2])
@@ -95,8 +97,8 @@ def geometry_plan(findings: MissionFindings) -> str:
 def geometry_elevation(findings: MissionFindings) -> str:
     """Draw the collection from the side as SVG, with heights, slant ranges and elevation angles.
 
-    Each platform is drawn in the vertical plane through it and the scene centre, so that its slant range and
-    elevation are true. If these planes are more than 90° apart in azimuth, they are drawn on opposite sides.
+    Each platform is drawn in the vertical plane that contains it and the scene centre, so that its slant range and
+    elevation are not distorted. If these planes are more than 90° apart in azimuth, they are drawn on opposite sides.
     """
     geometry = findings.geometry
     turned = _planes_apart(geometry)
@@ -124,7 +126,7 @@ def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple
 
 
 def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
-    """Positions of a platform along the aperture, (3,) each; only the two end points for a straight path. [m]"""
+    """Positions of a platform along its path over the aperture; only the two end points if it is straight. [m]"""
     steps = 1 if state.is_straight else _PATH_STEPS
     if state.curve is not None:
         steps = max(steps, _STEPS_PER_PIECE * state.curve.count)
@@ -139,7 +141,7 @@ def _direction(velocity: Vectors) -> Vector:
 
 
 def _planes_apart(geometry: BistaticGeometry) -> float:
-    """Angle between the vertical planes through the platforms, 0 to π. [rad]"""
+    """Angle between the vertical planes through the platforms and the scene centre, 0 to π. [rad]"""
     turn = float(geometry.receiver.azimuth - geometry.transmitter.azimuth)
     return abs((turn + math.pi) % (2 * math.pi) - math.pi)
 
@@ -147,7 +149,8 @@ def _planes_apart(geometry: BistaticGeometry) -> float:
 def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
     """Whether the receiver is drawn on the side opposite to the transmitter.
 
-    This is so if the azimuths are more than 90° apart (`turned` [rad]), or if one platform would cover the other.
+    This is the case if the azimuths of the platforms differ by more than 90°, or if the symbols of the platforms
+    would overlap on the same side. `turned` [rad] is the difference of the azimuths.
     """
     if turned > math.pi / 2:
         return True
@@ -169,7 +172,7 @@ def _seen(
     projected: Callable[[Vector], PlanePoint],
     toward: float,
 ) -> _Platform:
-    """Return a platform in the drawing plane; `projected` maps a vector to this plane."""
+    """Project a platform on the drawing plane; `projected` maps a vector to this plane."""
     path = tuple(map(projected, _flown(state, findings.aperture_time)))
     return _Platform(
         name, state, projected(plain_vector(state.position)), projected(_direction(state.velocity)), toward, path
@@ -220,7 +223,7 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 class _Panel(NamedTuple):
-    """One panel of a drawing: its frame [px], the point `centre` that is at its middle [m], and its scale [px/m]."""
+    """One panel of a drawing: its frame [px], the point `centre` [m] shown in its middle, and its scale [px/m]."""
 
     frame: svg.Box
     centre: PlanePoint
@@ -232,7 +235,7 @@ class _Panel(NamedTuple):
 
 
 def _drawing(view: _View, kind: str, side: str, description: str, note: str = "") -> str:
-    """Draw a view as SVG, with an enlargement below if objects are too close, and a note on the symbols."""
+    """Draw a view as SVG, with an enlargement below if objects are too close together, and a note on the symbols."""
     canvas = svg.Canvas()
     main = _main_panel(view)
     enlarged = _enlargement(view, main)
@@ -261,7 +264,7 @@ def _drawing(view: _View, kind: str, side: str, description: str, note: str = ""
 
 
 def _main_panel(view: _View) -> _Panel:
-    """Make the panel with the platforms and the scene. A scene much larger than the collection is clipped."""
+    """Make the main panel with the platforms and the scene; a scene much larger than the collection is clipped."""
     points = [_SCENE_CENTRE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
     if view.radius <= 2 * max(math.hypot(*point) for point in points):
         points += _extent(view, _SCENE_CENTRE, view.radius)
@@ -273,9 +276,10 @@ def _platforms_at_scene(view: _View, main: _Panel) -> list[_Platform]:
 
 
 def _enlargement(view: _View, main: _Panel) -> _Panel | None:
-    """Panel below the main panel for platforms close to the scene or to each other.
+    """Make a panel below the main panel for platforms close to the scene or to each other.
 
-    None if there are none, or if the panel would not separate them or enlarge enough.
+    Returns None if there are no such platforms, or if an enlargement would be too small to be useful or would not
+    separate them.
     """
     top = main.frame.bottom + _AXIS_PX[1] + 26
     first, second = view.platforms
@@ -299,7 +303,7 @@ def _enlargement(view: _View, main: _Panel) -> _Panel | None:
 
 
 def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
-    """Yield sentences that explain the symbols that have no label."""
+    """Yield sentences that explain the symbols that have no labels."""
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         yield "Arrows at the platforms: direction of flight, not speed."
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
@@ -309,9 +313,9 @@ def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
 
 
 def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
-    """Outermost points of a circle with radius `reach` [m] around `centre`.
+    """Outermost points of a circle with radius `reach` [m] around `centre`, as seen in the view.
 
-    There are four in the view from above and two in the side view.
+    Four points are returned for the view from above, and two for the side view.
     """
     x, y = centre
     ends = [(x - reach, y), (x + reach, y)]
@@ -319,7 +323,7 @@ def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
 
 
 def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fraction: float = 1.0) -> _Panel:
-    """Make a panel with the largest scale at which all points and margins for their labels fit."""
+    """Make a panel with the largest scale at which all points fit, with margins for their labels."""
     (lowest, highest), (margin_side, margin_above, margin_below) = _PLAN if view.is_plan else _SIDE
     highest *= height_fraction
     xs, ys = zip(*points, strict=True)
@@ -338,7 +342,7 @@ def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fracti
 
 
 def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
-    """Draw grid, ticks and names of the axes, with the same step on both axes."""
+    """Draw the grid, ticks and names of the axes; both axes have the same tick spacing."""
     frame, scale = panel.frame, panel.scale
     step = svg.round_step(62 / scale)
     reach = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
@@ -366,7 +370,7 @@ def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
 
 
 def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
-    """Draw the frame of an enlargement, with a scale bar."""
+    """Draw the frame and the scale bar of an enlargement."""
     frame = panel.frame
     svg.outline(canvas, frame, "grid")
     length = svg.round_step(40 / panel.scale)
@@ -379,7 +383,7 @@ def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
 
 
 def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
-    """Draw the content of a panel: first lines, then markers, then labels in the remaining space."""
+    """Draw the content of a panel: first lines, then markers, and finally labels in the remaining space."""
     frame, scene = panel.frame, panel.pixel(_SCENE_CENTRE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
@@ -458,7 +462,7 @@ def _range(view: _View, platform: _Platform) -> str:
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
-    """Draw the look direction φ_b (11) and the smear direction (31) as arrows, and yield their labels."""
+    """Draw arrows for the look direction φ_b of equation (11) and the smear direction of (31); yield their labels."""
     scene, look = panel.pixel(_SCENE_CENTRE), float(view.findings.geometry.look_azimuth)
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]
@@ -473,7 +477,7 @@ def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
 
 
 def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
-    """Draw the elevation angle at the scene as an arc."""
+    """Draw the elevation angle of a platform as an arc around the scene centre."""
     scene = panel.pixel(_SCENE_CENTRE)
     end = math.atan2(platform.at[1], platform.at[0])
     start = 0.0 if end <= math.pi / 2 else math.pi
@@ -528,7 +532,7 @@ def _shows_path(panel: _Panel, platform: _Platform) -> bool:
 
 
 def _degrees(angle: float) -> str:
-    """Text of an angle [rad] in degrees, with up to two decimals."""
+    """Write an angle [rad] in degrees, with up to two decimals."""
     return f"{svg.axis_number(round(math.degrees(angle), 2))}°"
 
 

@@ -1,9 +1,9 @@
-"""Images of a simulated mission and their causes: numbers, drawings, files and a summary in words.
+"""Images of a simulated mission and the errors in them: numbers, drawings, files and a summary in words.
 
-The panels are Figures 3 to 7 of Rigling & Moses for any mission. Their titles and legends are written for readers who
-do not know the paper; an option writes the numbers of the paper's figures and equations instead.
-All coordinates are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of (10),
-rotated about the same centre. A response is at its displaced position, not at the middle of a patch.
+The panels are Figures 3 to 7 of Rigling & Moses, drawn for any mission. Titles and legends are written for readers
+who do not know the paper. With an option, they have the numbers of the paper's figures and equations instead. All
+coordinates are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of equation
+(10), rotated about the same centre. A response is at its displaced position, not at the middle of a patch.
 """
 
 import math
@@ -60,13 +60,13 @@ Limits = tuple[float, float, float, float]
 
 
 class _PanelText(NamedTuple):
-    """A title or an entry of the legend: for readers who do not know the paper, and with the paper's numbers."""
+    """A title or legend entry in two versions: `plain` for readers without the paper, `paper` with its numbers."""
 
     plain: str
     paper: str
 
     def of(self, *, is_paper: bool) -> str:
-        """One of the two texts."""
+        """The version with the paper's numbers if `is_paper`, otherwise the plain version."""
         return self.paper if is_paper else self.plain
 
 
@@ -96,11 +96,11 @@ _NOT_FORMED = _PanelText("no image formed", "no image formed")
 class ImagePanel(NamedTuple):
     """An image in dB relative to the error-free peak, with the corners of its pixels.
 
-    `level_db` (nx, ny) has x or x′ along its first axis, and NaN for pixels without an image. `corners`
-    (nx + 1, ny + 1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets, and
-    `shown_places` (n, 2) are their image points by (25). `image_points` (n, 2) are their peaks in the image; it is
-    empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of the thirds of the aperture by (29).
-    All coordinates are in metres along `axes`.
+    `level_db` (nx, ny) has x or x′ along its first axis, and NaN for pixels without an image. `corners` (nx + 1, ny +
+    1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets, and `shown_places` (n,
+    2) their image points by equation (25). `image_points` (n, 2) are the peaks of the targets in the image; it is
+    empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of each target by equation (29), for
+    each third of the aperture. All coordinates are in metres along `axes`.
     """
 
     title: str
@@ -135,10 +135,10 @@ class ImagePanel(NamedTuple):
 class Sheet(NamedTuple):
     """Data of all panels.
 
-    `segments` (3, 2, 2) are the end points, time [s] and range error [mm], of three straight lines, each of which
-    approximates the range error over a third of the aperture. `points` (3, 2) are the image points of these thirds by
-    (29) for a target at the scene centre [m]. `points_by` names the gradients in (29). If `is_paper` is True,
-    titles and legends have the numbers of the paper's figures and equations.
+    The range error is approximated by a straight line over each third of the aperture. `segments` (3, 2, 2) has the
+    two end points of each line: time [s] and range error [mm]. `points` (3, 2) [m] are the image points for these
+    thirds, by equation (29), of a target at the scene centre. `points_by` names the gradients that are used in (29).
+    If `is_paper` is True, titles and legends have the numbers of the paper's figures and equations.
     """
 
     slow_time: Floats
@@ -154,7 +154,7 @@ class Sheet(NamedTuple):
     is_paper: bool = False
 
     def words(self, words: _PanelText) -> str:
-        """Title or entry of the legend for the readers of this sheet."""
+        """Title or legend entry, in the plain version or in the version with the paper's numbers."""
         return words.of(is_paper=self.is_paper)
 
 
@@ -214,7 +214,7 @@ def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
 
 
 def rotated_back(images: PointImages) -> Complexes:
-    """Resample the focused image on the pixels of the image along (x, y), the last step in the paper."""
+    """Resample the focused image to the pixels of the image along (x, y), which is the last step in the paper."""
     return resampled(images.focused, images.grid, images.scene_grid)
 
 
@@ -227,10 +227,10 @@ def _segments_of(images: PointImages) -> Floats:
 
 
 def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) -> tuple[slice, slice]:
-    """Slices of the part of a patch to draw, which has equal lengths in metres along both axes.
+    """Slices that select the part of a patch to be drawn; its length in metres is the same along both axes.
 
-    The part contains all pixels that are above a level in any image, and a margin for the nearest sidelobes. `peak`
-    is the error-free peak, `spacing` the pixel spacing along both axes. [m]
+    The part contains all pixels that exceed a given level in any image, and a margin for the nearest sidelobes.
+    `peak` is the error-free peak, and `spacing` the pixel spacing along both axes. [m]
     """
     bright = np.maximum.reduce([np.abs(image) for image in images]) > peak * 10 ** (_DRAWN_DB / 20)
     used_indices = [np.nonzero(bright.any(axis=1 - axis))[0] for axis in (0, 1)]
@@ -247,7 +247,7 @@ def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) 
 
 
 def _interpolated(image: Complexes, grid: Floats, region: tuple[slice, slice], peak: float) -> tuple[Floats, Floats]:
-    """Interpolate a region of an image. Returns its levels [dB] and the corners of its pixels [m]."""
+    """Interpolate a region of an image; return its levels [dB] and the corners of its pixels [m]."""
     rows, columns = region
     shape = (rows.stop - rows.start, columns.stop - columns.start)
     factor = max(1, min(_FINE_FACTOR, math.isqrt(int(_MAX_PICTURE_PIXELS / (shape[0] * shape[1])))))
@@ -287,9 +287,9 @@ def _cuts_of(images: PointImages, turned: Floats, region: tuple[slice, slice], p
 
 # ---------------------------------------------------------------------- drawn
 def drawn(images: PointImages, title: str, kind: str, *, is_paper: bool = False) -> bytes:
-    """Draw all panels on one sheet. Returns the content of a `png`, `svg` or `pdf` file.
+    """Draw all panels on one sheet; return the content of a `png`, `svg` or `pdf` file.
 
-    `is_paper` is described in `sheet`.
+    See `sheet` for `is_paper`.
     """
     return figure_file(figure(sheet(images, is_paper=is_paper), title), kind)
 
@@ -299,7 +299,10 @@ MarkStyle = dict[str, Any]
 
 
 def figure(drawn: Sheet, title: str) -> "Figure":
-    """Arrange all panels on one Matplotlib figure: causes and cuts above, images below, then legend and colours."""
+    """Arrange all panels on one Matplotlib figure.
+
+    Range errors and cuts are at the top, images below them, and the legend and colours at the bottom.
+    """
     page = new_figure(figsize=_PAGE_INCHES)
     rows = page.add_gridspec(3, 1, height_ratios=(1, 1.12, _KEY_HEIGHT_RATIO), hspace=0.08)
     above, images, key_row = (page.add_subfigure(rows[index]) for index in range(3))
@@ -315,7 +318,7 @@ def figure(drawn: Sheet, title: str) -> "Figure":
 
 
 def _legend(key: "Axes", drawn: Sheet) -> None:
-    """Explain the marks in the images."""
+    """Draw a legend that explains the marks in the images; `key` are the Matplotlib axes of the legend."""
     styles: list[tuple[MarkStyle, _PanelText]] = [
         (_target_mark(_TARGET_COLOR), _TARGET),
         (_prediction_mark(_PREDICTION_COLOR), _PREDICTION),
@@ -339,7 +342,7 @@ def _legend(key: "Axes", drawn: Sheet) -> None:
 
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
-    """Draw a single small panel for a page. Returns the content of a PNG file; `name` is a key of `PANELS`."""
+    """Draw a single small panel for a page; return the content of a PNG file. `name` is a key of `PANELS`."""
     if name == "cuts":
         return drawing_file(_cuts_drawing(drawn, _CUT_SIZE_PX), "png", dpi=112)
     page = new_figure(figsize=(4.4, 3.6))
@@ -353,7 +356,7 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
 def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
     """Return the bytes of an NPZ file with the complex images, their grids and the errors.
 
-    `changes` are the options that changed the mission. They are stored as texts `KEY=VALUE`, (n,).
+    `changes` are the options that changed the mission. They are stored as an array (n,) of strings `KEY=VALUE`.
     """
     file = BytesIO()
     np.savez_compressed(
@@ -382,7 +385,7 @@ def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
 
 
 def flown_words(mission: Mission) -> str:
-    """Describe the errors with which the images of a mission are formed, and the errors that no image has."""
+    """Describe the errors with which the images of a mission are formed, and the errors that are not simulated."""
     factor = mission.allocation.coverage_factor
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
@@ -409,9 +412,9 @@ def flown_words(mission: Mission) -> str:
 
 
 def _stated_effect_words(mission: Mission) -> str:
-    """Describe errors that the file states by their effects.
+    """Describe the errors that are stated in the file by their effects.
 
-    An effect can have many causes. The text states the cause that is simulated in the images.
+    An effect can have many causes. The text therefore states the cause that is simulated in the images.
     """
     ways = {
         "as a phase of the receiver": ("quadratic_phase_error", "cubic_phase_error"),
@@ -496,8 +499,8 @@ def _of_the_point(images: PointImages) -> list[str]:
 def _of_targets(images: PointImages) -> list[str]:
     """Write a line for each target, below two header lines.
 
-    A line has the position, level, displacement and quadratic phase, and for the images with errors and after
-    autofocus the peak relative to the error-free peak and the width of the cut.
+    A line has the position, level, displacement and quadratic phase of the target. For the image with errors and the
+    image after autofocus, it also has the peak relative to the error-free peak, and the width of the cut.
     """
     lines = [
         f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
@@ -550,7 +553,10 @@ def _points(panel: "Axes", drawn: Sheet) -> None:
 
 
 def _image(panel: "Axes", picture: ImagePanel, *, with_points: bool = False) -> "QuadMesh":
-    """Draw an image. Each pixel is drawn between its corners, because pixel rows follow curves of equal range."""
+    """Draw an image.
+
+    Each pixel is drawn as the quadrilateral between its corners, because pixel rows follow curves of equal range.
+    """
     mesh = panel.pcolormesh(
         picture.corners[..., 0],
         picture.corners[..., 1],
@@ -592,7 +598,7 @@ def _target_mark(color: str) -> MarkStyle:
 
 
 def _prediction_mark(color: str) -> MarkStyle:
-    """Style of the mark at the image point of a target by (25): a circle."""
+    """Style of the mark at the image point of a target by equation (25): a circle."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
@@ -606,7 +612,7 @@ def _is_within(point: Floats, limits: Limits) -> bool:
 
 
 def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
-    """Write the distance of a target that is outside the panel, with an arrow towards the target."""
+    """Write the distance to a target that lies outside the panel, with an arrow towards the target."""
     away = point - middle
     distance = float(np.hypot(*away))
     panel.text(0.04, 0.04, f"the target is {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes)
@@ -616,9 +622,10 @@ def _point_to(panel: "Axes", point: Floats, middle: Floats, color: str) -> None:
 
 
 def _cuts_drawing(drawn: Sheet, size: tuple[float, float]) -> str:
-    """Drawing of the cross-range cuts as SVG, in the style of a report, with the part that is above the floor.
+    """Draw the cross-range cuts as SVG in the style of a report.
 
-    `size` is the width of the drawing and the height of its frame. [px]
+    The cuts are drawn only over the range of positions in which at least one cut exceeds the lowest level of the
+    panel. `size` [px] is the width of the drawing and the height of its frame.
     """
     canvas = Canvas()
     curves = [*drawn.cuts[1:], drawn.cuts[0]]  # the cut without error is last, so that no line covers it

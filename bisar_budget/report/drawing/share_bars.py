@@ -1,6 +1,6 @@
-"""Draw how much each error contributes to the limits of rows, as stacked bars.
+"""Draw stacked bars that show which fraction of a row's limit each error uses.
 
-The errors have the same numbers as in the specification sheet.
+The errors are labelled with their numbers in the specification sheet.
 """
 
 from bisar_budget.faults import printable
@@ -27,7 +27,7 @@ _SHARES_STYLE = (
 
 
 def limiting(sheet: SpecificationSheet) -> list[RowUse]:
-    """Rows of a specification sheet that limit at least one specification, ordered by their requirements."""
+    """Rows of a specification sheet that limit at least one specification, in the order of their requirements."""
     rows = [row for row in sheet.rows if row.multiplier > LEAST_WEIGHT_FRACTION]
     order = [*REQUIREMENT_NAMES, None]
     return sorted(rows, key=lambda row: order.index(row.requirement))
@@ -36,7 +36,7 @@ def limiting(sheet: SpecificationSheet) -> list[RowUse]:
 def share_bars(sheet: SpecificationSheet) -> str:
     """Draw a stacked bar as SVG for each row that limits a specification.
 
-    Each part of a bar is the contribution of one error to the limit of the row.
+    Each part of a bar shows the fraction of the row's limit that one error uses.
     """
     canvas = svg.Canvas()
     keys = [spec.key for spec in sheet.specifications]

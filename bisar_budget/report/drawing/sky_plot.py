@@ -1,7 +1,7 @@
 """Draw the passes of a satellite: their tracks in the sky over the scene, and the resolution of each pass.
 
 The sky is oriented like a map, with north up, east to the right and the zenith in the middle. A track has the colour
-of its status, an arrow head where the satellite sets, and a dot at the mid-time.
+of the status of its pass, an arrow head where the satellite sets, and a dot at the middle of the aperture.
 """
 
 import math
@@ -31,8 +31,8 @@ _STATUS_DASHES = ("", "6 3", "2 2.5")  # of statuses with the same colour
 def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     """Draw passes as SVG.
 
-    `verdict` is the sentence with the number of complying passes. It is written below the name of the mission, and
-    also serves as the description for readers who cannot see the drawing.
+    `verdict` is a sentence with the number of complying passes. It is written below the name of the mission, and also
+    serves as the description for readers who cannot see the drawing.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, [svg.short(passes.name, _SKY_WIDTH_PX), printable(verdict)])
@@ -82,7 +82,10 @@ def _style(statuses: Sequence[str], width: float) -> str:
 
 # ---------------------------------------------------------------- the sky
 def _at(middle: svg.Point, azimuth: float, elevation: float) -> svg.Point:
-    """Point on the page for a direction, given by azimuth (from east, counter-clockwise) and elevation. [rad]"""
+    """Point on the page for a direction in the sky.
+
+    The direction is given by azimuth (from east, counter-clockwise) and elevation. [rad]
+    """
     radius, angle = _HORIZON_PX * (1 - 2 * elevation / math.pi), bearing(azimuth)
     return middle[0] + radius * math.sin(angle), middle[1] - radius * math.cos(angle)
 
@@ -92,7 +95,7 @@ def _ring(middle: svg.Point, elevation: float) -> list[svg.Point]:
 
 
 def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
-    """Draw the sky with its tracks and their numbers."""
+    """Draw the sky with the tracks of the passes and their numbers."""
     for degrees in range(0, 360, 30):
         azimuth = math.radians(90 - degrees)
         canvas.lines([(_at(middle, azimuth, math.pi / 2), _at(middle, azimuth, 0.0))], "grid")
@@ -127,7 +130,7 @@ def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
 
 
 def _arrow(track: Sequence[svg.Point]) -> list[svg.Point]:
-    """Arrow head at the end of a track, along its last segment."""
+    """Points of the arrow head at the end of a track, along the last segment of the track."""
     (x, y), (u, v) = track[-1], track[-2]
     length = math.dist((x, y), (u, v)) or 1.0
     along = ((x - u) / length, (y - v) / length)
@@ -139,9 +142,9 @@ def _arrow(track: Sequence[svg.Point]) -> list[svg.Point]:
 def _numbers(
     canvas: svg.Canvas, overpasses: Sequence[SatellitePass], marks: Sequence[svg.Point], within: svg.Box
 ) -> None:
-    """Write the numbers of passes beside their marks.
+    """Write the number of each pass beside its mark.
 
-    If there are very many passes, only complying passes get numbers, and only if these are few.
+    If there are very many passes, only complying passes are numbered, and only if they are few.
     """
     numbered_marks = list(zip(overpasses, marks, strict=True))
     if len(numbered_marks) > _MAX_NUMBERED_COUNT:
@@ -152,7 +155,10 @@ def _numbers(
 
 # ---------------------------------------------------------------- resolution over time
 def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
-    """Draw the range and cross-range resolution of each pass against its mid-time, on a logarithmic scale."""
+    """Draw the resolution of each pass over time, on a logarithmic scale.
+
+    Each pass has a mark for the range resolution and a mark for the cross-range resolution.
+    """
     span = passes.stop.since(passes.start)
     across = svg.Scale(0.0, span, frame.left, frame.right)
     shown = [(overpass, resolutions) for overpass in passes.found if (resolutions := _sizes(overpass))]
@@ -189,7 +195,7 @@ def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
 
 
 def _sizes(overpass: SatellitePass) -> tuple[float, float] | None:
-    """Range and cross-range resolution [m]; None for a pass without an image."""
+    """Range and cross-range resolution of a pass [m]; None if no image can be formed."""
     range_resolution, cross_range_resolution = overpass.range_resolution, overpass.cross_range_resolution
     if (
         range_resolution is None
@@ -206,7 +212,7 @@ def _square(canvas: svg.Canvas, at: svg.Point, style: str) -> None:
 
 
 def _dates(start: Instant, span: float, width: float) -> Iterator[tuple[float, str]]:
-    """Yield the tick times of the date axis, in seconds after the start [s], each with its date or hour as text."""
+    """Yield the tick times of the date axis, counted from the start [s], each with its date or hour as text."""
     hours = next(
         (step for step in _DATE_STEPS_HOURS if step * _HOUR_S * width >= span * _DATE_PX), _DATE_STEPS_HOURS[-1]
     )

@@ -1,8 +1,9 @@
-"""A small SVG canvas with axes, colours, lines, markers, and labels that find free space. Its output is reproducible.
+"""A small SVG canvas with axes, colours, lines, markers, and automatically placed labels; its output is reproducible.
 
-Colours are custom properties with a fallback, so that a page which inlines a drawing can set them: --ink, --muted,
---grid, --paper, --transmitter, --receiver. A drawing in a separate file has its own light and dark colours. Only the
-title and the description have ids, which depend on `key`, so that one page can hold drawings of many missions.
+Colours are CSS custom properties with a fallback, so that a page with an inlined drawing can set them: --ink,
+--muted, --grid, --paper, --transmitter, --receiver. A drawing in a separate file has its own light and dark colours.
+Only the title and the description have ids. They contain the argument `key` of `Canvas.document`, so that one page
+can have drawings of many missions.
 """
 
 import math
@@ -59,18 +60,18 @@ _MARGIN_PX = 2.0  # around a label
 
 @dataclass(frozen=True)
 class _LabelCosts:
-    """Costs of a label position. Their unit is that of a covered area. [px²]
+    """Costs that determine the position of a label, in the unit of a covered area. [px²]
 
     Attributes
     ----------
     outside : float
-        Cost of a position that leaves the box of the label.
+        Cost of a position at which the label extends beyond the box in which it must be written.
     covered : float
-        Cost of each obstacle that the label covers, in addition to the covered area.
+        Cost of each obstacle covered by the label, in addition to the covered area.
     crossed_per_px : float
-        Cost of each pixel of a line that the label covers.
+        Cost of each pixel of a line covered by the label.
     distance_per_px : float
-        Cost of each pixel between the label and its point.
+        Cost of each pixel of the distance between the label and its point.
     direction : float
         Cost of each step in the order of preferred directions.
     """
@@ -106,11 +107,11 @@ class Box(NamedTuple):
         return (self.left + self.right) / 2, (self.top + self.bottom) / 2
 
     def upright(self, x: float) -> Segment:
-        """Vertical line through the box at x."""
+        """Vertical line segment across the box at `x`."""
         return (x, self.top), (x, self.bottom)
 
     def level(self, y: float) -> Segment:
-        """Horizontal line through the box at y."""
+        """Horizontal line segment across the box at `y`."""
         return (self.left, y), (self.right, y)
 
     def covered_by(self, box: "Box") -> float:
@@ -125,7 +126,7 @@ class Box(NamedTuple):
         return self.left <= point[0] <= self.right and self.top <= point[1] <= self.bottom
 
     def clipped(self, segment: Segment) -> Segment | None:
-        """Part of a line segment that is inside the box, by the Liang-Barsky algorithm; None if there is none."""
+        """Part of a line segment inside the box, by the Liang-Barsky algorithm; None if the segment is outside."""
         (x, y), (u, v) = segment
         dx, dy = u - x, v - y
         enter, leave = 0.0, 1.0
@@ -143,7 +144,7 @@ class Box(NamedTuple):
 
 
 class DrawnLabel(NamedTuple):
-    """A label for a point: lines of text that must be written inside a box."""
+    """A label for a point: lines of text, and the box inside which they must be written."""
 
     at: Point
     lines: tuple[str, ...]
@@ -159,7 +160,7 @@ class _LabelPosition(NamedTuple):
 
 
 class Canvas:
-    """Collects the elements of one drawing, and the obstacles that labels avoid."""
+    """The elements of a drawing in progress, and the obstacles that its labels avoid."""
 
     def __init__(self) -> None:
         self._elements: list[str] = []
@@ -188,7 +189,7 @@ class Canvas:
             self.obstacles.append(Box(min(xs), min(ys), max(xs), max(ys)))
 
     def lines(self, lines: Iterable[Segment], style: str) -> None:
-        """Draw many lines, each between two points, as one element."""
+        """Draw many straight lines, each between two points, as one element."""
         self._path("".join(map(_through, lines)), style)
 
     def boxes(self, boxes: Iterable[Box], style: str) -> None:
@@ -208,7 +209,7 @@ class Canvas:
         self.obstacles.append(Box(x - radius, y - radius, x + radius, y + radius))
 
     def arrow(self, tail: Point, tip: Point, colour: str = "", both_ends: bool = False) -> None:
-        """Draw a line with a head at its tip."""
+        """Draw a straight line with an arrow head at its tip."""
         self.polyline([tail, tip], f"line {colour}".rstrip())
         for end, start in ((tip, tail), (tail, tip)) if both_ends else ((tip, tail),):
             length = math.dist(end, start)
@@ -220,7 +221,10 @@ class Canvas:
             self.polygon([end, *sides], f"solid {colour}".rstrip(), is_obstacle=False)
 
     def text(self, at: Point, lines: Sequence[str], style: str = "", anchor: str = "start") -> None:
-        """Write lines of text, beginning at `at`, on the baseline. The first of several lines is styled as a name."""
+        """Write lines of text, starting at `at` on the first baseline.
+
+        The first of several lines is styled as a name.
+        """
         x, y = at
         spans = []
         for index, line in enumerate(lines):
@@ -243,8 +247,8 @@ class Canvas:
     def labels(self, labels: Sequence["DrawnLabel"]) -> None:
         """Write labels near their points, where they overlap least with the drawing and with other labels.
 
-        Labels are placed one after the other. An early label may take the only good position of a later one, so
-        several orders are tried, and the order with the lowest cost is used.
+        Labels are placed one after the other. A label may occupy the only good position of a label that comes later.
+        Therefore several orders are tried, and the order with the lowest total cost is used.
         """
         options = [self._options(label) for label in labels]
         indices = range(len(labels))
@@ -259,7 +263,7 @@ class Canvas:
             self.text((x[candidate.anchor], box.top + 0.8 * LINE_PX), label.lines, anchor=candidate.anchor)
 
     def _options(self, label: "DrawnLabel") -> list["_LabelPosition"]:
-        """Positions around the point of a label with their costs, cheapest first."""
+        """Possible positions of a label around its point with their costs, cheapest first."""
         width = max(text_width(line) for line in label.lines) + 2 * _MARGIN_PX
         height = LINE_PX * len(label.lines)
         candidates = list(_positions(label.at, width, height))
@@ -286,9 +290,10 @@ class Canvas:
         return cost
 
     def document(self, size: tuple[float, float], key: str, title: str, description: str, style: str = "") -> str:
-        """Return the drawing as SVG, with a title and a description for readers who cannot see it.
+        """Return the drawing as SVG text, with a title and a description for readers who cannot see it.
 
-        `style` are CSS rules of this kind of drawing, in addition to `DRAWING_STYLE`.
+        `key` makes the ids unique. `style` has the CSS rules for this kind of drawing, in addition to
+        `DRAWING_STYLE`.
         """
         name = "d" + sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:10]
         width, height = (_number(side) for side in size)
@@ -303,21 +308,21 @@ class Canvas:
 
 
 def _through(points: Iterable[Point]) -> str:
-    """SVG path data of a line through points."""
+    """SVG path data of a line through the given points."""
     return "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
 
 
 def text_width(line: str) -> float:
-    """Width of a text, estimated generously because the font is unknown. [px]"""
+    """Width of a line of text, estimated generously because the font is unknown. [px]"""
     return FONT_PX * math.fsum(
         0.36 if c in _NARROW_LETTERS else 0.95 if c in _WIDE_LETTERS else 0.74 if c.isupper() else 0.62 for c in line
     )
 
 
 def _positions(at: Point, width: float, height: float) -> Iterator["_LabelPosition"]:
-    """Yield possible positions of a label around a point, with costs.
+    """Yield possible positions of a label around a point, with their costs.
 
-    The cost grows with the distance from the point, and with the place of the direction in the order of preference.
+    The cost grows with the distance from the point, and is higher for less preferred directions.
     """
     for gap in _LABEL_GAPS_PX:
         for order, (x, y) in enumerate(_DIRECTIONS):
@@ -337,7 +342,7 @@ def _positioned(
 ) -> tuple[float, dict[int, "_LabelPosition"]]:
     """Place labels one after the other in the given order.
 
-    Returns the total cost, and the position of each label by its index.
+    Returns the total cost, and a dictionary with the position of each label, by the index of the label.
     """
     total, taken = 0.0, dict[int, _LabelPosition]()
     for index in order:
@@ -383,7 +388,7 @@ def _with_subscripts(line: str) -> str:
 
 
 def _number(value: float) -> str:
-    """Write a coordinate to a hundredth of a pixel, without trailing zeros and without -0."""
+    """Write a coordinate, rounded to a hundredth of a pixel, without trailing zeros and without -0."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
@@ -401,7 +406,7 @@ def axis_number(value: float) -> str:
 
 
 def ticks(lower: float, upper: float, step: float) -> Sequence[float]:
-    """Multiples of a step between two values."""
+    """Multiples of `step` between two values."""
     first, last = math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9)
     return [index * step for index in range(first, last + 1)]
 
@@ -414,7 +419,7 @@ def round_step(least: float) -> float:
 
 
 class Scale(NamedTuple):
-    """Map from values `low` to `high` to coordinates `start` to `end` [px], linear or logarithmic."""
+    """Linear or logarithmic scale that maps values `low` … `high` to coordinates `start` … `end` [px]."""
 
     low: float
     high: float
@@ -428,7 +433,7 @@ class Scale(NamedTuple):
         return self.start + (value - low) / (high - low) * (self.end - self.start)
 
     def ticks(self, room: float) -> Sequence[float]:
-        """Round numbers for ticks that are at least `room` px apart."""
+        """Choose ticks at round values that are at least `room` px apart."""
         size, (low, high) = abs(self.end - self.start), sorted((self.low, self.high))
         if not self.is_log:
             return ticks(low, high, round_step((high - low) * room / size))
@@ -450,7 +455,10 @@ def short(word: str, room: float) -> str:
 
 
 def head(canvas: Canvas, lines: Sequence[str]) -> float:
-    """Write the lines above a drawing; the first is its name. Returns the top of the drawing. [px]"""
+    """Write lines of text above a drawing; return the y coordinate of the top of the drawing. [px]
+
+    The first line is styled as the name of the drawing.
+    """
     for index, line in enumerate(lines):
         canvas.text((8, 18 + index * LINE_PX), [line], "small" if index else "name")
     return 16 + len(lines) * LINE_PX if lines else 10.0
@@ -459,9 +467,9 @@ def head(canvas: Canvas, lines: Sequence[str]) -> float:
 def x_axis(
     canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = ""
 ) -> float:
-    """Write the numbers or words of an axis and its label below a frame, and `key` in small type below the label.
+    """Write the tick labels (numbers or `words`) and the label of an axis below a frame; return its bottom. [px]
 
-    Returns the bottom of the axis. [px]
+    `key` is written in small type below the axis label. The result is the y coordinate of the bottom of the axis.
     """
     bottom = frame.bottom
     room = (frame.right - frame.left) / max(len(words), 1)
@@ -487,9 +495,9 @@ def x_axis(
 
 
 def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = (), *, key: str = "") -> None:
-    """Write the numbers or words of an axis and its label to the left of a frame.
+    """Write tick labels (numbers or `words`) and the axis label to the left of a frame.
 
-    `key` is written in small type beside the label.
+    `key` is written in small type beside the axis label.
     """
     for index, word in enumerate(words):
         canvas.text((frame.left - 6, scale.at(index) + 4), [short(word, frame.left - 34)], "axis", "end")
@@ -510,7 +518,7 @@ def outline(canvas: Canvas, frame: Box, style: str) -> None:
 
 
 def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> None:
-    """Draw grid lines at the ticks of the given scales."""
+    """Draw grid lines at the ticks of the horizontal scale `across` and the vertical scale `up`; each may be None."""
     if across is not None:
         canvas.lines([frame.upright(across.at(value)) for value in across.ticks(_NUMBER_ROOM_PX["x"])], "grid")
     if up is not None:
@@ -518,9 +526,10 @@ def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> 
 
 
 class LegendLine(NamedTuple):
-    """An entry of a legend: its text, and a function that draws its mark, 25 px wide, to the right of a point.
+    """An entry of a legend: its text, and a function that draws its mark to the right of a given point.
 
-    `key` is a key of the mission file or an id, which is written in small type after the text.
+    The mark is 25 px wide. `key` is a key of the mission file or an id, which is written in small type after the
+    text.
     """
 
     words: str
@@ -529,17 +538,17 @@ class LegendLine(NamedTuple):
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """Make the legend entry for a line that is drawn in `style`."""
+    """Make a legend entry for a line that is drawn in `style`."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
 
 
 def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> LegendLine:
-    """Legend entry for a circle that is drawn in `style`; `radius` is in px."""
+    """Make a legend entry for a circle that is drawn in `style`; `radius` is in px."""
     return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), radius, style))
 
 
 def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
-    """Legend entry for a rectangle that is drawn in several styles on top of each other."""
+    """Make a legend entry for a rectangle that is drawn in several styles on top of each other."""
 
     def mark(at: Point) -> None:
         for style in styles:
@@ -549,7 +558,7 @@ def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
 
 
 def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLine]) -> float:
-    """Write entries in lines below a drawing. Returns the bottom of the legend. [px]"""
+    """Write the entries of a legend in lines below a drawing; return the y coordinate of its bottom. [px]"""
     x, y = _LEGEND_INDENT_PX, top + 20
     for entry in entries:
         lines = wrap(printable(entry.words), _LEGEND_CHARACTERS, max_lines=3, placeholder=" …")
@@ -573,7 +582,7 @@ EMPTY_TONE = "reserve"  # colour of a case without a valid mission
 
 @cache
 def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """Colours of the page by name: first for white paper, then for a dark screen."""
+    """Colours by name, in two mappings: for a white page, and for a dark screen."""
     sheet = resource("templates", "report.css").read_text(encoding="utf-8")
     blocks = sheet.split("}", 2)[:2]
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in blocks)
@@ -599,14 +608,14 @@ def tone_of(status: str) -> str:
 
 
 def status_words(status: str) -> str:
-    """Name of a status in a legend."""
+    """Name of a status for a legend."""
     return "no such mission" if has_no_mission(status) else STATUS[status].words
 
 
 def marks_within_colours(statuses: Sequence[str], marks: Sequence[Mark]) -> Mapping[str, Mark]:
-    """Assign a mark to each status.
+    """Assign a mark to each status; statuses with the same colour get successive items of `marks`.
 
-    Statuses with the same colour get successive items of `marks`. If there are too few, the last item is repeated.
+    If there are too few items, the last item is repeated.
     """
     tones = [tone_of(name) for name in statuses]
     indices = (tones[:index].count(tone) for index, tone in enumerate(tones))

@@ -1,7 +1,7 @@
-"""Draw the effect of each number of a mission on its worst utilization as a tornado diagram, largest at the top.
+"""Draw a tornado diagram: the effect of each number of a mission file on the worst utilization, largest at the top.
 
-Each bar shows the effect of a change of 1 %: 1 % of the number itself, of a radian, of a power, or of the smaller
-slant range.
+Each bar shows the effect of a change of 1 %. Depending on the kind of number, this is 1 % of the number itself, 1 %
+of a radian, 1 % of a power ratio (for a level in dB), or 1 % of the smaller slant range.
 """
 
 from bisar_budget.faults import changes_words, printable
@@ -24,10 +24,10 @@ _BAR_STYLES = {"larger": "", "smaller": " pale"}  # style of a bar by the change
 
 
 def tornado(sensitivity: Sensitivity) -> str:
-    """Draw the numbers with the largest effects as SVG.
+    """Draw the numbers of a mission file with the largest effects as SVG.
 
-    A strong bar shows the effect of increasing a number, a pale bar the effect of decreasing it. Both use the same
-    slope.
+    A strong bar shows the effect of increasing a number, a pale bar the effect of decreasing it. Both effects are
+    computed from the same slope.
     """
     canvas = svg.Canvas()
     shown = sensitivity.shown[:MAX_BAR_COUNT]
@@ -88,7 +88,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Text with the change in a number for which the bar shows the effect, with its unit."""
+    """Text with the change of a number whose effect a bar shows: its size and its unit."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

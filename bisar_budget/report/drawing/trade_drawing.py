@@ -1,10 +1,11 @@
 """Draw a sweep over one key as curves, or a sweep over two keys as a map.
 
-Curves show the utilizations and their limit, or the values of a column. A map shows the statuses or the values of a
-column.
+Curves show the utilizations of rows and their limit, or the values of a column in the table of the sweep. A map shows
+the statuses of the cases, or the values of a column.
 
-A report inlines the drawing with the colours of the page. `sweep --plot` writes it to a file with light and dark
-colours. A polar map is a view from above: azimuth from east, counter-clockwise, and the other key as the radius.
+In a report, the drawing is inlined and has the colours of the page. `sweep --plot` writes it to a file with light and
+dark colours. A polar map is a view from above: its angle is the azimuth, counter-clockwise from east, and its radius
+is the other key.
 """
 
 import math
@@ -66,7 +67,8 @@ def trade_drawing(
     trade : Trade
         Sweep over one or two keys. The first axis of a polar map is the azimuth.
     rows : Mapping[str, ndarray]
-        Utilizations (cases,) of each row that is the worst row in at least one case, if only one key varies. [-]
+        For a sweep over one key: the rows that are the worst row in at least one case, with their utilizations
+        (cases,). [-]
     key : str
         String that makes the ids in the SVG unique.
     title, description : str
@@ -75,7 +77,7 @@ def trade_drawing(
         Lines of text to print above the drawing if it is stored in a file of its own. The first line is the name of
         the mission.
     seen_from_above : BistaticGeometry, optional
-        Geometry for a polar map, which shows the direction of the platform that does not vary.
+        Collection geometry for a polar map, in which the direction of the fixed platform is marked.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, above)
@@ -92,8 +94,8 @@ def trade_drawing(
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
     """Lines of text to print above a drawing that is stored in a file of its own.
 
-    They give the name of the mission, the fixed values, the changes by options, and the gating model. For a polar
-    map, the last two lines name its angle and radius, in words and by their keys.
+    They state the name of the mission, the values that do not vary, the changes made by options, and the model that
+    decides the verdicts. For a polar map, the last two lines describe the angle and the radius, with their keys.
     """
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"
@@ -154,7 +156,7 @@ def _heat_colour(fraction: float) -> str:
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Make the axis scale for the values of a column.
+    """Make the axis scale for the values of a column of the sweep's table.
 
     The scale for utilizations [%] is logarithmic and includes 10 % and 100 %.
     """
@@ -181,10 +183,12 @@ def _curves(
     word_axis: Axis | None,
     by_word: Mapping[str, Trade],
 ) -> float:
-    """Draw curves over a key with numbers: utilizations with their limit, or the values of a column.
+    """Draw curves over a key with numerical values; return the y coordinate of the bottom of the drawing. [px]
 
-    There is one curve for each row, or for each word in `by_word`, which has the sweep for each word of `word_axis`.
-    The background has the colour of the status. Returns the bottom of the drawing. [px]
+    The curves show utilizations with their limit, or the values of a column in the table of the sweep. There is one
+    curve for each row. If a second key has words as its values, there is one curve for each word instead: `word_axis`
+    is the axis of this key, and `by_word` has the sweep for each word. Without a second key, the colour of the
+    background shows the status.
     """
     first = next(iter(by_word.values())) if by_word else trade
     (axis,) = first.axes
@@ -228,7 +232,7 @@ def _curves(
 def _curve(
     canvas: svg.Canvas, frame: svg.Box, across: svg.Scale, up: svg.Scale, x: Floats, values: Floats, style: str
 ) -> None:
-    """Draw one curve with gaps at missing values. A single value between gaps is drawn as a short line."""
+    """Draw a curve with gaps at missing values. A single value between gaps is drawn as a short line."""
     points = [
         (across.at(position), up.at(value)) if math.isfinite(value) and (value > 0 or not up.is_log) else None
         for position, value in zip(x.tolist(), values.tolist(), strict=True)
@@ -250,9 +254,9 @@ def _curve(
 
 
 def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
-    """Reduce a dense curve to the points that can be seen.
+    """Reduce a dense curve to the points that can be distinguished in the drawing.
 
-    They are the first, lowest, highest and last point in each half pixel.
+    These are the first, lowest, highest and last point within each half pixel of width.
     """
     height = itemgetter(1)
     visible: list[svg.Point] = []
@@ -269,8 +273,8 @@ def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
 def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
     """Draw a sweep over a key whose values are words: one bar for each word, in the colour of its status.
 
-    A bar shows the worst utilization, with a dot for each row, or the value of the column. Returns the bottom of the
-    drawing. [px]
+    A bar shows the worst utilization, with a dot for each row, or the value of a column of the sweep's table. Returns
+    the y coordinate of the bottom of the drawing. [px]
     """
     (axis,) = trade.axes
     left = min(max(map(svg.text_width, axis.words)) + 44, _MAX_NAMES_PX)
@@ -318,8 +322,8 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
 class _Plane(NamedTuple):
     """Conversion from the two varied keys of a map to coordinates on the page.
 
-    The scales give horizontal and vertical coordinates [px]. For a polar map they give azimuth [rad] and radius [px]
-    around `middle`.
+    The two scales convert values of the keys to horizontal and vertical coordinates [px]. For a polar map, they
+    convert to azimuth [rad] and radius [px] around `middle`.
     """
 
     across: svg.Scale
@@ -327,7 +331,7 @@ class _Plane(NamedTuple):
     middle: svg.Point | None = None
 
     def at(self, p: float, q: float) -> svg.Point:
-        """Point on the page [px] for the coordinates that the two scales give."""
+        """Point on the page [px] for coordinates `p`, `q` as given by the two scales."""
         if self.middle is None:
             return p, q
         return self.middle[0] + q * math.cos(p), self.middle[1] - q * math.sin(p)
@@ -356,7 +360,8 @@ class _Plane(NamedTuple):
 def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
     """Make the scale of a map axis from `start` to `end` on the page.
 
-    On an axis of words each word gets a cell of width 1. A scale of numbers goes from the first value to the last.
+    If the values are words, each word occupies a cell of width 1. If they are numbers, the scale extends from the
+    first value to the last.
     """
     if axis.words:
         return svg.Scale(-0.5, axis.values[-1] + 0.5, start, end)
@@ -364,9 +369,9 @@ def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
 
 
 def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometry | None) -> float:
-    """Draw a map of statuses or of a column against two keys, with the 100 % contour and the binding rows.
+    """Draw a map over two keys: the statuses, with the 100 % contour and the binding rows, or the values of a column.
 
-    Returns the bottom of the drawing. [px]
+    Returns the y coordinate of the bottom of the drawing. [px]
     """
     trade = thinned(trade)
     x, y = trade.axes
@@ -413,7 +418,7 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
-    """Yield the cells of a mask as rectangles. Neighbours along the first axis are merged into one rectangle."""
+    """Yield the True cells of a mask as rectangles. Neighbours along the first axis are merged into one rectangle."""
     for j in range(mask.shape[1]):
         padded = np.concatenate([[False], mask[:, j], [False]])
         ends = np.flatnonzero(padded[1:] != padded[:-1])
@@ -425,7 +430,7 @@ def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[fl
 def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
     """Contour line where the utilization is 100 %.
 
-    The logarithm of the utilization is interpolated, because it is less curved than the utilization.
+    The logarithm of the utilization is interpolated, because it is less curved than the utilization itself.
     """
     uses = np.asarray(trade.values["utilization"], float)
     # With a row that is not evaluated, the other rows do not determine the distance to the limit.
@@ -441,7 +446,7 @@ def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
 def _heat(
     canvas: svg.Canvas, frame: svg.Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> None:
-    """Draw a column as a heat map with a colour bar.
+    """Draw the values of `trade.column`, a column of the sweep's table, as a heat map with a colour bar.
 
     The colour scale is logarithmic if the values span more than two decades.
     """
@@ -486,10 +491,11 @@ def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines:
 def _names(
     canvas: svg.Canvas, rows: NumbersOrWords, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> list[svg.LegendLine]:
-    """Write the name of the binding row in each region: horizontally, vertically in a tall region, or as a letter.
+    """Write the name of the binding row into each region of a map.
 
-    The id of the row is written in small type below its name. Regions of a polar map have letters. Returns legend
-    entries for the letters and for regions without a name.
+    The name is horizontal, or vertical in a tall region, with the id of the row in small type below it. A letter is
+    written instead in polar maps, and in regions too small for the name. Returns legend entries for the letters and
+    for regions without a name.
     """
     letters: dict[str, str] = {}
     named = set()
@@ -533,10 +539,10 @@ def _names(
 
 # ---------------------------------------------------------------- from above
 def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
-    """Make the scales of a polar map: azimuth counter-clockwise from east, and the other key as the radius.
+    """Make the scales of a polar map, for the azimuth (counter-clockwise from east) and for the radius.
 
-    The value in the middle is 0. It is 90 deg if the other key is an elevation, because a platform at this elevation
-    is above the scene.
+    The radius shows the other key, and is 0 where the value of this key is 0. If this key is an elevation, the radius
+    is 0 at 90 deg, because a platform at this elevation is above the scene.
     """
     first, last = float(around.values[0]), float(around.values[-1])
     is_elevation = radius.key.endswith(".elevation")
@@ -551,8 +557,8 @@ def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
 def _around(canvas: svg.Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[svg.LegendLine]:
     """Draw the grid of a polar map: directions, and circles labelled with the values of the radius.
 
-    If only one platform varies, a mark at the rim shows the direction to the fixed platform. Returns the legend entry
-    of this mark.
+    If the azimuth belongs to only one platform, a mark at the rim shows the direction to the other platform. Returns
+    the legend entry for this mark in a list, which is empty if there is no mark.
     """
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}

@@ -1,4 +1,4 @@
-"""Compute the content of a sweep drawing as arrays: axes, curves, regions and contour lines."""
+"""Compute the arrays for the drawing of a sweep: axes, curves, regions and contour lines."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -30,8 +30,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     Raises
     ------
     QuestionError
-        The sweep is not a grid, does not vary one or two keys, or has too many cases. A polar map has no azimuth, or
-        its other key is not a number or has negative values.
+        The sweep is not a grid, does not vary one or two keys, or has too many cases. A polar map also requires that
+        one key is an azimuth, and that the other key is a number without negative values.
     """
     accepted = "accepted: --vary of one key, or of two"
     if not cases.is_grid:
@@ -54,12 +54,12 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
 
 
 def varying_keys(cases: Cases) -> list[Varied]:
-    """Keys that have more than one value in a sweep."""
+    """Keys with more than one value in a sweep."""
     return [varied for varied, size in zip(cases.varied, cases.shape, strict=True) if size > 1]
 
 
 class Gathered:
-    """Collects the table columns that a plot needs while the parts of a sweep are computed."""
+    """Columns of a sweep's table that are needed for a plot, collected while the parts of the sweep are computed."""
 
     def __init__(self, described: Described, names: Sequence[str] = (), column: str | None = None) -> None:
         self.described, self.cases = described, described.cases
@@ -76,18 +76,18 @@ class Gathered:
         self.pieces: dict[str, list[NumbersOrWords]] = {name: [] for name in needed}
 
     def add(self, part: Part) -> None:
-        """Keep the columns that the plot needs from one part of a sweep."""
+        """Store the columns needed for the plot from one part of a sweep."""
         for name, column_pieces in self.pieces.items():
             column_pieces.append(self.described.converted(name, part.values[name]))
 
     def passing(self, parts: Iterable[Part]) -> Iterator[Part]:
-        """Yield the parts of a sweep unchanged, and keep the columns that the plot needs."""
+        """Yield the parts of a sweep unchanged, and store the columns needed for the plot from each part."""
         for part in parts:
             self.add(part)
             yield part
 
     def trade(self, *, is_polar: bool = False) -> Trade:
-        """Return the collected sweep with its axes sorted. For a polar map, the azimuth is the first axis."""
+        """Return the collected sweep with sorted axes. For a polar map, the azimuth is the first axis."""
         axes: list[Axis] = []
         varying_indices, fixed, orders = [], [], []
         for index, (varied, values) in enumerate(zip(self.cases.varied, self.cases.columns, strict=True)):
@@ -111,7 +111,7 @@ class Gathered:
         return Trade(tuple(axes), laid_out, tuple(fixed), self.column, self.heading)
 
     def _axis(self, varied: Varied, values: Values) -> Axis:
-        """Make the axis of a key, with its values in the order of the sweep."""
+        """Make the axis for a varied key, with the values in the order of the sweep."""
         if not isinstance(varied, Number):
             words = tuple(values.tolist())
             own_value = float(words.index(varied.value)) if varied.value in words else None
@@ -123,12 +123,16 @@ class Gathered:
 
 
 def _heading(column: Column) -> str:
-    """Name of a column in words, and its unit."""
+    """Heading of a table column: its description and its unit."""
     return column._replace(name=in_words(column.name)).heading
 
 
 def _is_log(values: Floats) -> bool:
-    """Whether an axis is logarithmic: its values span a large factor, and their ratios vary less than their steps."""
+    """Whether an axis should be logarithmic.
+
+    This is the case if the ratio of the largest to the smallest value is large, and neighbouring values vary less in
+    their ratios than in their differences.
+    """
     if values[0] <= 0 or values[-1] / values[0] < _LOG_SPAN_RATIO or values.size < 3:
         return False
     steps, ratios = np.diff(values), np.diff(np.log(values))
@@ -154,13 +158,13 @@ def per_word(trade: Trade) -> tuple[Axis, Mapping[str, Trade]] | None:
 
 
 def rows_that_matter(trade: Trade) -> tuple[str, ...]:
-    """Rows that are the worst row in at least one case, the most frequent first; at most `MAX_ROWS` rows."""
+    """Rows that are the worst row in at least one case, most frequent first, limited to `MAX_ROWS` rows."""
     rows, counts = np.unique(trade.values["worst_row"][trade.values["worst_row"] != ""], return_counts=True)
     return tuple(str(row) for row in rows[np.argsort(-counts, kind="stable")][:MAX_ROWS])
 
 
 def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) -> Mapping[str, Floats]:
-    """Utilizations of the rows that matter in a sweep over one key, (cases,) each; empty for any other sweep.
+    """Utilizations of the rows from `rows_that_matter` in a sweep over one key, (cases,) each; else an empty mapping.
 
     `gathered` runs the sweep again and collects the columns with the given names.
     """
@@ -171,18 +175,19 @@ def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) ->
 
 
 def cell_edges(axis: Axis) -> list[float]:
-    """Edges of the map cells around the values of an axis.
+    """Edges of the map cells that surround the values of an axis.
 
-    The first and last cell of a number axis end at its first and last value. Cells of words are not cut off.
+    If the values are numbers, the first cell begins at the first value, and the last cell ends at the last value. If
+    they are words, all cells have their full width.
     """
     edges = axis.edges.tolist()
     return edges if axis.words else [float(axis.values[0]), *edges[1:-1], float(axis.values[-1])]
 
 
 def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield the start and stop indices of each run of equal consecutive items in a sequence of n items.
+    """Yield the start and stop indices of each run of equal neighbouring items in a sequence of n items.
 
-    `begins` (n - 1,) is True for each item after the first that begins a new run.
+    `begins` (n - 1,) has a value for each item except the first: True if the item begins a new run.
     """
     return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
 
@@ -190,7 +195,7 @@ def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, float]]:
     """Yield the intervals of an axis in which neighbouring cases have the same status.
 
-    Each interval is given by its status, first edge and last edge.
+    Each interval is given by its status and its two ends.
     """
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
@@ -200,8 +205,8 @@ def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, flo
 class MapRegion(NamedTuple):
     """A region of neighbouring cells of a map with the same worst row.
 
-    `cell` holds the indices of the cell where the name is written. `size` holds the numbers of consecutive cells of
-    the region, counted through this cell along the first and along the second axis.
+    `cell` has the indices of the cell in which the name is written. `size` is the extent of the region through this
+    cell, along the first and along the second axis, as numbers of cells.
     """
 
     row: str
@@ -210,7 +215,7 @@ class MapRegion(NamedTuple):
 
 
 def thinned(trade: Trade) -> Trade:
-    """Thin a sweep over two keys to at most `_MAX_MAP_CELLS` numbers per axis, including the first and the last."""
+    """Reduce a sweep over two keys to at most `_MAX_MAP_CELLS` numbers per axis, keeping the first and the last."""
     picks = [
         np.arange(size)
         if axis.words
@@ -224,7 +229,8 @@ def thinned(trade: Trade) -> Trade:
 def regions(rows: NumbersOrWords) -> list[MapRegion]:
     """Regions of a map that are large enough for a name.
 
-    The name is written in the cell farthest from other regions. `rows` (n, m) holds the worst row of each cell.
+    A region consists of connected cells with the same worst row. The name is written in the cell farthest from other
+    regions. `rows` (n, m) has the worst row of each cell.
     """
     seen = rows == ""
     map_regions = []
@@ -242,7 +248,7 @@ def regions(rows: NumbersOrWords) -> list[MapRegion]:
 
 
 def _connected(rows: NumbersOrWords, seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
-    """Indices of the cells that have the same row as `start` and are connected to it by common sides.
+    """Indices of the cells that have the same worst row as the cell `start`, and are connected to it by common sides.
 
     These cells are marked in `seen`.
     """
@@ -272,7 +278,7 @@ def _innermost(mask: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _run(line: NDArray[np.bool_], index: int) -> int:
-    """Number of consecutive True cells of a line around the cell at an index."""
+    """Number of consecutive True cells in a line of cells, including the cell at `index`."""
     ends = np.flatnonzero(~line)
     low = ends[ends < index].max(initial=-1)
     high = ends[ends > index].min(initial=line.size)
@@ -280,9 +286,10 @@ def _run(line: NDArray[np.bool_], index: int) -> int:
 
 
 def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
-    """Border lines between cells (n, m) of a map with different rows, as end points (count, 2, 2).
+    """Border lines between neighbouring cells of a map with different worst rows, (count, 2, 2).
 
-    `first` (n + 1,) and `second` (m + 1,) are the edges of the cells along the two axes.
+    Each line is given by its two end points. `rows` (n, m) has the worst row of each cell. `first` (n + 1,) and
+    `second` (m + 1,) are the edges of the cells along the two axes.
     """
     lines = []
     i, j = np.nonzero(rows[1:] != rows[:-1])
@@ -293,10 +300,10 @@ def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
 
 
 def level_lines(levels: Floats, x: Floats, y: Floats) -> list[tuple[Point, Point]]:
-    """Contour lines where a grid of numbers is 0, by linear interpolation between the grid points.
+    """Contour lines at level 0 of values on a grid, found by linear interpolation between the grid points.
 
-    `levels` is (n, m) at `x` (n,) and `y` (m,). A cell with a non-finite corner has no line. In a saddle, the mean of
-    the four corners decides which corners are connected.
+    `levels` (n, m) are the values at `x` (n,) and `y` (m,). A cell with a corner that is not finite has no line. In a
+    saddle, the mean of the values at the four corners decides which corners are connected.
     """
     lines: list[tuple[Point, Point]] = []
     is_finite = np.isfinite(levels)

@@ -1,1 +1,1 @@
-"""Explanations of the status of a row: equations with their numbers, and their typesetting."""
+"""Explanations of the status of a row: equations with numbers, and the typesetting of the equations."""

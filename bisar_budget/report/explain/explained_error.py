@@ -1,4 +1,4 @@
-"""Explanation steps of an error: from its line in the file to its phase, displacement and allowable."""
+"""Explanation steps for an error: from its line in the file to its phase, displacement and allowable."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ from bisar_budget.report.words.sentences import dotted
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     """Yield the explanation steps that derive the value `declared` from the line in the mission file.
 
-    They show the stated value, its frame and the coverage factor.
+    They show the value in the file, its frame and the coverage factor.
     """
     yield from stated(mission, source.path, source.declared, source.evidence)
     if source.declared is None:
@@ -48,9 +48,9 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
 
 
 def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
-    """Yield the explanation step that converts errors stated in another frame to the axes of the scene.
+    """Yield the explanation step that converts errors from the frame in which they are stated to the scene axes.
 
-    The result is the declared error along `axis`.
+    The result of the step is the declared error along `axis`.
     """
     platform, kind = source.owner, source.subject.kind
     error = getattr(mission.platforms, platform).motion_error
@@ -116,7 +116,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     """Coefficient β̃ₙ of the range error of one unit, where n is `order`. [m/sⁿ per unit]
 
-    β̃₂ and β̃₃ are computed from their phases at the aperture edge, (2π/λ)·β̃ₙ·(T/2)ⁿ.
+    β̃₂ and β̃₃ are computed from the phases at the aperture edge, which are (2π/λ)·β̃ₙ·(T/2)ⁿ.
     """
     if order < 2:
         return float(source.effect[order])
@@ -208,7 +208,7 @@ def _state_effect(analysis: Analysis, source: ErrorSource, size: float, each: st
 
 
 def _table_i(kind: StateKind, axis: str) -> str:
-    """Label of the row in Table I for a position, velocity or acceleration error along an axis of the scene."""
+    """Label of the row in Table I of the paper for a position, velocity or acceleration error along a scene axis."""
     return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
 
@@ -220,9 +220,9 @@ def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> Error
 def _common_effect(
     analysis: Analysis, source: ErrorSource, kind: StateKind, size: float, each: str
 ) -> Iterator[Step]:
-    """Yield the explanation steps for an error that both platforms share.
+    """Yield the explanation steps for an error that both platforms have in common.
 
-    The phases of both legs add with their signs.
+    The error causes a phase through each platform, and the two phases are added with their signs.
     """
     axis, values = source.subject.axis, dict[str, float]()
     for platform in PLATFORMS:
@@ -244,9 +244,9 @@ def _common_effect(
 
 
 def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the explanation steps for a time tag error.
+    """Yield the explanation steps for a time-tag error.
 
-    They give its position and velocity errors, and its published phase.
+    They show the position and velocity errors that it causes, and its phase by the published model.
     """
     size = abs(size)
     for name in (PLATFORMS[index] for index in source.platforms):
@@ -275,9 +275,9 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 
 
 def _registered_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the explanation steps for an error of a registered kind.
+    """Yield the explanation steps for an error of a registered kind, which is defined by an installed package.
 
-    They give the description of the kind, and the published phase of the error.
+    They show the description of the kind, and the phase of the error by the published model.
     """
     yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
     unit = f"rad per {source.unit}"
@@ -311,9 +311,10 @@ def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
 
 
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
-    """Sum the quadratic phases along the axes of the scene, each projected on the axis of the error.
+    """Quadratic phase per unit of an error along any axis, as a sum over the axes of the scene.
 
-    Returns the sum as text and as a number, per unit of the error [rad per unit].
+    The phase for each scene axis is multiplied by the component of the error's axis along it. The sum is returned as
+    text and as a number. [rad/unit]
     """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
@@ -326,7 +327,7 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
 def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps for an error with equal components in the frames of both platforms.
 
-    The projected effects of both platforms add with their signs.
+    The effects through both platforms are projected on the axis of the error, and added with their signs.
     """
     axis, frame = source.subject.axis, source.subject.frame
     unit, values = f"rad per {source.unit}", dict[str, float]()
@@ -360,7 +361,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
 
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
-    """Yield the explanation step that computes the displacement of the image, equation (25)."""
+    """Yield the explanation step for the displacement of the image by equation (25)."""
     published, by_table = analysis.published, source.effect
     if published.degeneracy or source.declared is None:
         return
@@ -380,16 +381,16 @@ def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
 
 
 def location(mission: Mission, path: KeyPath) -> str:
-    """Location of a value as `file:line:column`. If the file lacks the key, its nearest parent key is located."""
+    """Location of a value as `file:line:column`; if its key is missing, the location of the nearest parent."""
     line = mission.line(path)
     file = printable(mission.file)
     return file if line is None else f"{file}:{line.region.line}:{line.region.column}"
 
 
 def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: str | None) -> Iterator[Step]:
-    """Yield the explanation steps with the line and the evidence of a declared value.
+    """Yield the explanation steps that show the line of a declared value in the file, and its evidence.
 
-    If the value is missing, there is one step, which names the key.
+    If the value is missing, there is a single step, which names the missing key.
     """
     if declared is None:
         yield step(missing(mission, path))
@@ -400,12 +401,12 @@ def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: st
 
 
 def missing(mission: Mission, path: KeyPath) -> str:
-    """Sentence about a key that the file does not declare, with the location of the nearest key."""
+    """Sentence about a key that is missing in the file, with the location of the nearest parent key."""
     return f"Not declared: no {dotted(path)} (the nearest key is at {location(mission, path)})"
 
 
 def as_written(mission: Mission, path: KeyPath) -> str:
-    """A value of the mission file as `key: value`. If the file lacks the key, its nearest parent key is given."""
+    """A value of the mission file as `key: value`; if the file lacks its key, the nearest parent key is used."""
     while path and path not in mission.places:
         path = path[:-1]
     text = getattr(mission.places.get(path), "value", None)
@@ -419,10 +420,10 @@ _MIN_SHOWN_BEYOND_RAD = 1e-6  # rms phase beyond the cubic that may be rounding
 
 
 class Residual:
-    """Range error that remains at the displaced image of the scene centre, for one error with a signed size.
+    """Residual range error at the displaced image of the scene centre, for one error of given size and sign.
 
-    `image_point` is the displacement east and north [m], or None if there is no image. `ranges` are the residual
-    range errors at the nodes of the polynomial fit [m]; the list is empty without an image.
+    `image_point` is the displacement of the image, east and north [m], or None if there is no image. `ranges` has the
+    residual range errors at the nodes of the polynomial fit [m], and is empty if there is no image.
     """
 
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
@@ -446,9 +447,10 @@ class Residual:
 
     @cached_property
     def orders(self) -> list[float]:
-        """Polynomial orders 0 to 3 of the residual range error. [m]
+        """Parts of polynomial orders 0 to 3 of the residual range error. [m]
 
-        Order 0 is the mean. Orders 1 to 3 are signed values at the aperture edge.
+        The part of order 0 is the mean. The parts of orders 1 to 3 are given by their signed values at the aperture
+        edge.
         """
         return [
             math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True)) for weights in self.exact.fit.tolist()
@@ -456,14 +458,14 @@ class Residual:
 
     @cached_property
     def beyond(self) -> list[float]:
-        """Residual range error at the nodes of the fit, without its polynomial orders 0 to 3. [m]"""
+        """Residual range error at the nodes of the fit, without its parts of polynomial orders 0 to 3. [m]"""
         fitted_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC_ORDER) @ (
             self.orders / LEGENDRE_LEADING
         )
         return _without_rounding((np.array(self.ranges) - fitted_orders).tolist(), self.rms(self.ranges))
 
     def rms(self, values: Sequence[float]) -> float:
-        """RMS over the aperture of a range error with the given `values` at the nodes. [m]"""
+        """RMS over the aperture of a range error, which is given by its `values` at the nodes. [m]"""
         return math.sqrt(math.fsum(w * m * m for w, m in zip(self.exact.fit[0].tolist(), values, strict=True)))
 
     @property
@@ -473,24 +475,24 @@ class Residual:
 
     @property
     def is_turned(self) -> bool:
-        """Whether a line of sight turns by more than a radian, so that polynomial orders have no meaning."""
+        """Whether a line of sight turns by more than one radian, so that polynomial orders are meaningless."""
         return bool(self.exact.is_turned[0])
 
     def phase(self, order: int) -> float:
-        """Signed phase at the aperture edge of one order of the range error. [rad]"""
+        """Signed phase at the aperture edge due to the part of order `order` of the residual range error. [rad]"""
         return self.k * self.orders[order]
 
     @property
     def beyond_phase(self) -> float:
-        """Rms phase of the part of the range error beyond the cubic order. [rad]"""
+        """RMS phase due to the part of the residual range error beyond the cubic order. [rad]"""
         return self.k * self.rms(self.beyond)
 
     @property
     def hidden(self) -> float:
-        """Quadratic phase with the same peak loss as the residual phases that are not quadratic. [rad]
+        """Hidden phase: the quadratic phase that would cause the same peak loss as some residual phases. [rad]
 
-        These are the phase that changes over the band, and the linear phase over the aperture. If `is_turned`, the
-        cubic and higher orders are included.
+        These residual phases are the phase that changes over the band, and the linear phase over the aperture. If
+        `is_turned`, the cubic phase and the phases of higher orders are included.
         """
         square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
@@ -501,8 +503,9 @@ class Residual:
     def judged(self) -> float:
         """Phase that is compared with the limit of the quadratic phase. [rad]
 
-        The limit contains the gain of autofocus, but autofocus does not correct the hidden phase. The hidden phase is
-        therefore multiplied by this gain, and the result is the root-sum-square of both phases.
+        The limit includes the gain of autofocus, but autofocus does not correct the hidden phase. Therefore the
+        hidden phase is multiplied by this gain. The result is the root-sum-square of this product and the quadratic
+        phase.
         """
         return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
@@ -516,8 +519,8 @@ class Residual:
     def steps(self, mark: str = "full") -> Iterator[Step]:
         """Yield the explanation steps that derive the judged phase from the residual range error.
 
-        The judged phase is a quadratic phase with the same peak loss. `mark` is appended to the symbols of the
-        phases.
+        The judged phase is the quadratic phase with the same peak loss as all residual phases together. `mark` is
+        appended to the symbols of the phases.
         """
         values = {"B": self.radar.bandwidth, "f_0": self.radar.center_frequency}
         b = math.sqrt(float(self.exact.band[0]))
@@ -565,12 +568,12 @@ class Residual:
             yield step("Judged against a limit that includes the gain: autofocus corrects no hidden phase", worked)
 
     def listed(self, values: Sequence[float]) -> list[str]:
-        """Write one line of text for each node of the fit: its time [s] and its value in `values` [m]."""
+        """Write a line of text for each node of the fit: the time of the node [s] and its value in `values` [m]."""
         times = self.exact.times[:, 0].tolist()
         return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
 
     def rest_steps(self) -> Iterator[Step]:
-        """Yield the explanation steps for the part of the range error beyond the cubic order.
+        """Yield the explanation steps for the part of the residual range error beyond the cubic order.
 
         They list this part at the nodes and compute its RMS phase.
         """
@@ -593,9 +596,9 @@ class Residual:
 
 
 def _without_rounding(values: Sequence[float], full_size: float) -> list[float]:
-    """Set to 0 each value that may be only rounding error.
+    """Replace values by 0 if they may be only rounding errors.
 
-    The values are differences of numbers as large as `full_size`.
+    The values are differences of larger numbers, and `full_size` is the size of these numbers.
     """
     return [value if abs(value) > VECTOR_ROUNDING_FRACTION * full_size else 0.0 for value in values]
 
@@ -615,7 +618,7 @@ def _beyond_phase(residual: Residual) -> float:
 def worse_sign(
     analysis: Analysis, source: ErrorSource, size: float, measure: Callable[[Residual], float] = _judged
 ) -> Residual:
-    """Residual range error of `+size` or `-size`, whichever gives the larger value of `measure`."""
+    """Residual range error for an error of `+size` or of `-size`, whichever gives the larger value of `measure`."""
     signs = [Residual(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
@@ -626,8 +629,8 @@ def worse_sign(
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps that derive the phases of an error by the full model from its signed size.
 
-    `size` is in the unit of the error. It is one unit if the error is not declared. The text `each` then states this,
-    and is inserted into the titles of the steps.
+    `size` is in the unit of the error. If the error is not declared, `size` is one unit. The text `each` then states
+    this; it is inserted into the titles of the steps.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
@@ -667,9 +670,9 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
 
 
 def _orbit_motion(analysis: Analysis, source: ErrorSource, size: float) -> Iterator[Step]:
-    """Yield an explanation step for each platform in free fall.
+    """Yield an explanation step for each platform in free fall on which the error acts.
 
-    It gives the position error of the platform at the first and last node of the fit.
+    The step states the position error of this platform at the first and at the last node of the fit.
     """
     if source.shifts is None:
         return
@@ -696,9 +699,9 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the explanation step with the quadratic phase by the full model.
+    """Yield the explanation step that shows the quadratic phase by the full model for comparison.
 
-    It is for comparison with the published model, which decides the status.
+    The status is decided by the published model.
     """
     residual = worse_sign(analysis, source, size, _of_order(_QUADRATIC_ORDER))
     if not residual.ranges:
@@ -713,7 +716,7 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
 def at_the_allowable(
     analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
 ) -> Iterator[Step]:
-    """Yield the explanation steps that check an allowable found by a search.
+    """Yield the explanation steps that confirm an allowable found by a numerical search.
 
     They show that an error of this size just reaches the limit.
     """
@@ -739,9 +742,9 @@ def _displacement_of(residual: Residual) -> float:
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
-    """Yield the explanation step with the largest error, `size` in `unit`, for which an image exists.
+    """Yield the explanation step for the largest error at which an image point exists: `size` in `unit`.
 
-    No ground point has the range history of a larger error.
+    For a larger error, no ground point has the recorded range history.
     """
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
@@ -751,14 +754,15 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
 
 
 def no_limit(row: Row) -> Step:
-    """Return the explanation step which states that a row has no limit, with the reason."""
+    """Return the explanation step that states why a row has no limit."""
     return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
 
 
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
     """Yield the explanation steps for the allowable of a row, which is the smallest of `sizes`.
 
-    `sizes` holds the size that each requirement allows. Its keys are symbols in the explanation, such as `by_QPE`.
+    `sizes` has the size that each requirement allows. The keys are the symbols of these sizes in the explanation,
+    such as `by_QPE`.
     """
     if row.allowable is None or not sizes:
         yield no_limit(row)
@@ -787,9 +791,9 @@ RULE_WORDS = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-squa
 
 
 def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
-    """Yield the explanation steps for the quadratic phase limit of `owner`.
+    """Yield the explanation steps for the limit on the quadratic phase that applies to `owner`, such as a platform.
 
-    The limit is the product of budget, share and autofocus gain.
+    The limit is the product of the budget, the share of `owner`, and the autofocus gain.
     """
     total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
     owner_words = {
@@ -830,7 +834,8 @@ def combined(
 ) -> Iterator[Step]:
     """Yield the explanation step that combines the sizes of several errors into a total.
 
-    `rule` selects their maximum, sum or root-sum-square. If `total` is None, the step only lists names and sizes.
+    `rule` selects the maximum, the sum or the root-sum-square. If `total` is None, the step only lists names and
+    sizes.
     """
     title = f"{title}, {RULE_WORDS[rule]}"
     # The remainder of terms that cancel exactly is rounding.

@@ -1,4 +1,4 @@
-"""Explanation steps of random errors: the phases of inertial sensors, clocks, air delays and vibrations."""
+"""Explanation steps for random errors: the phases of inertial sensors, clocks, atmospheric delays and vibrations."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -112,18 +112,18 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
 
 
 def _inertial(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for an inertial sensor.
+    """Yield the explanation steps for an error of an inertial sensor.
 
-    They explain the error first without and then with the lever arm of the platform.
+    They show its effect first without and then with the lever arm of the platform.
     """
     yield from _without_lever(analysis, _without_arm(analysis, error))
     yield from _with_arm(analysis, error)
 
 
 def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for an inertial sensor by the published model.
+    """Yield the explanation steps for an error of an inertial sensor by the published model, without a lever arm.
 
-    This model keeps the line of sight as it is at mid-aperture.
+    This model assumes that the line of sight does not change during the aperture.
     """
     mission, figure = analysis.mission, error.subject.axis
     symbol = INERTIAL_FIGURES[figure].symbol
@@ -159,7 +159,7 @@ def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
-    """Return the error of an inertial sensor for a copy of its platform without a lever arm."""
+    """Return an error of an inertial sensor as it would be if its platform had no lever arm."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     bare = platform._replace(motion_error=platform.motion_error._replace(lever_arm=None))
@@ -169,7 +169,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for a tilt error that also moves the antenna by means of a lever arm."""
+    """Yield the explanation steps for a tilt error that also moves the antenna through a lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or not INERTIAL_FIGURES[error.subject.axis].tilts:
         return
@@ -188,7 +188,7 @@ def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the explanation steps for a lever arm.
 
-    They give the arm at mid-aperture, and its motion along the line of sight for one radian of tilt.
+    They show the arm at mid-aperture, and the motion along the line of sight that one radian of tilt causes.
     """
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
@@ -239,10 +239,10 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _by_unit(values: Sequence[float], unit: str) -> list[str]:
-    """Write one line of text for each effect of one unit of an error, in `unit`.
+    """Write one line of text for each effect of one unit of an error.
 
-    `values` are the quadratic phase, the cubic phase and the residual after the cubic. The last values may be
-    missing.
+    `values` are the quadratic phase, the cubic phase and the residual beyond the cubic, in `unit`. The last value, or
+    the last two values, may be missing.
     """
     return [
         f"{symbol}/unit = {with_unit(value, unit)}" for symbol, value in zip(_PHASE_SYMBOLS, values, strict=False)
@@ -250,9 +250,9 @@ def _by_unit(values: Sequence[float], unit: str) -> list[str]:
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation step with the effects of one unit of an error by the full model.
+    """Yield the explanation step with the effects of one unit of an error according to the full model.
 
-    There is no step if the published model gives the same effects.
+    Nothing is yielded if the published model gives the same effects.
     """
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
@@ -271,7 +271,7 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _displacement(error: RandomError, model: str) -> Iterator[Step]:
-    """Yield the step with the displacement of the image by one unit of the error."""
+    """Yield the explanation step for the displacement of the image by one unit of the error."""
     effect = error.effect(model)
     if not effect.displacement > 0:
         return
@@ -288,9 +288,9 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _per_unit(unit: str, error: RandomError) -> str:
-    """Unit of the effect per unit of an error, such as `rad per m/s`.
+    """Unit of the effect of one unit of an error, such as `rad per m/s`.
 
-    For an error in dB it is `unit`, unchanged.
+    For an error stated in dB, `unit` is returned unchanged.
     """
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
@@ -299,7 +299,7 @@ def _unit_effect(figure: str, order: int, wavelength: float, T: float) -> float:
     """Phase caused by one unit of an inertial sensor error along the line of sight. [rad]
 
     `figure` is the key of the sensor error. `order` selects the quadratic phase (0), the cubic phase (1) or the
-    residual (2).
+    residual beyond the cubic (2).
     """
     row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(INERTIAL_FIGURES).index(figure)]
     return row[order]
@@ -317,9 +317,9 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for a zenith delay that changes within the aperture as a random process.
+    """Yield the explanation steps for a zenith delay that changes during the aperture as a random process.
 
-    If the delay is constant over the aperture, there are no steps.
+    Nothing is yielded if the delay is constant over the aperture.
     """
     correlation_time = correlation_time_of(analysis.mission, error.owner)
     if correlation_time is not None and error.published.quadratic:
@@ -335,10 +335,11 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _gauss_markov(
     mission: Mission, error: RandomError, correlation_time: float, along: str, title: str
 ) -> Iterator[Step]:
-    """Yield the explanation steps for the mean squares of a Gauss-Markov process, and its quadratic phase per unit.
+    """Yield the explanation steps for a Gauss-Markov process: its mean squares, and its quadratic phase per unit.
 
-    The phase is computed by the published model. `along` is the symbol of the component along the line of sight or,
-    for a delay, along the path through the air. `title` is the title of the last step.
+    The phase is computed by the published model. `along` is the symbol of the component along the line of sight. For
+    a delay, it is the symbol of the component along the signal path through the air. `title` is the title of the last
+    step.
     """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
@@ -385,11 +386,11 @@ def _oscillator(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _slow(
     kind: str, frequency: float, remaining: LeftTone, free: float, mission: Mission, unit: str
 ) -> Iterator[Step]:
-    """Yield the explanation step with the quadratic and cubic phase of a tone below one cycle per aperture.
+    """Yield the explanation step for the quadratic and cubic phase of a tone below one cycle per aperture.
 
-    If synchronization folds the tone, the step uses its folded frequencies below one cycle per aperture. The squares
-    of both phases are added to the squares of the noise phases. `free` is the peak phase without synchronization, in
-    `unit`.
+    If the synchronization of the clocks folds (aliases) the tone, the step uses the folded frequencies that are below
+    one cycle per aperture. Both phases are combined with the phases due to noise, as a sum of squares. `free` is the
+    peak phase without synchronization, in `unit`.
     """
     T = mission.collection.aperture_time
     slow = [
@@ -417,7 +418,7 @@ def _pieces_text(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 
 def _power_of_f(exponent: float) -> str:
-    """Text for a power of f, such as `f^2`.
+    """Text for a power of the frequency f, such as `f^2`.
 
     A negative exponent is put in brackets, so that its sign is not read as a subtraction.
     """
@@ -428,7 +429,8 @@ def _power_of_f(exponent: float) -> str:
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
     """Yield the explanation step for the drift of a clock since it was last set.
 
-    The step gives the standard deviations of the constant [m] and linear [m/s] range error, and their correlation.
+    The step shows the standard deviation of the constant range error [m] and of the linear range error [m/s], and the
+    correlation of both errors.
     """
     T, age, averaging = (
         np.array([value or 0.0]) for value in (mission.collection.aperture_time, sync.age, sync.averaging)
@@ -510,7 +512,7 @@ def _link(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
-    """Yield the explanation steps for the points and level shift of a spectrum of acceleration or displacement."""
+    """Yield the explanation steps for a spectrum of acceleration or displacement: its points and its shift in dB."""
     quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
     scale = STANDARD_GRAVITY_MPS2**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
@@ -555,9 +557,9 @@ def _spectrum(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for an oscillator under acceleration.
+    """Yield the explanation steps for the error of an oscillator under acceleration.
 
-    The acceleration comes from random vibration, slow tones or a turning platform.
+    The acceleration comes from random vibration, slow tones or the turn of a platform.
     """
     mission, name = analysis.mission, error.owner
     f_0, sync = mission.radar.center_frequency, mission.synchronization
@@ -599,7 +601,7 @@ def _acceleration(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _delays(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the explanation steps for an atmospheric delay.
 
-    They give the delay on each leg that it affects, and its change over the aperture.
+    They show the delay for each platform whose signal it affects, and its change over the aperture.
     """
     for name in legs_of(error.owner):
         yield from _delay_on_a_leg(analysis, error, name)
@@ -609,9 +611,9 @@ def _delays(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
-    """Yield the explanation steps that derive the delay on the leg `name` from one unit of zenith delay.
+    """Yield the explanation steps that derive the delay for platform `name` from one unit of zenith delay.
 
-    The delay is given at several times of the aperture.
+    The delay of the signal is shown at several times during the aperture.
     """
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
@@ -651,7 +653,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
 
 
 def _from_elsewhere(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation step for an error that the file states only by its effect on the image."""
+    """Yield the explanation step for an error that is stated in the file only by its effect on the image."""
     yield effect_from_elsewhere()
 
 
@@ -715,9 +717,10 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
-    """Coverage factor contained in the declared value of an error.
+    """Coverage factor that is included in the declared value of an error.
 
-    It is 1 for an error in dB, such as the noise of an oscillator. For such an error the phases contain the factor.
+    For an error in dB, such as the noise of an oscillator, the result is 1, because the phases of such an error
+    already include the coverage factor.
     """
     return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
@@ -776,9 +779,9 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:
-    """Yield the explanation step that adds the power of the cubic phase to the power of the residual phase.
+    """Yield the explanation step that adds the power of the cubic phase to the power of the phase beyond it.
 
-    The step is needed if the mission has no requirement on the cubic phase, so that ISLR limits both.
+    The step is needed if the mission has no requirement on the cubic phase, so that the ISLR limits both phases.
     """
     k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}

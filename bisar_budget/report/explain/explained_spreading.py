@@ -1,4 +1,4 @@
-"""Explanation steps for tones, their echoes and displacements, and for phase noise that spreads power."""
+"""Explanation steps for tones with their paired echoes and displacements, and for phase noise that spreads power."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -46,8 +46,8 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
     """Formula for the phase variance [rad²] that a required ISLR allows, and the values of its symbols.
 
-    The formula depends on `model`. `power` is the required ISLR as a power ratio. `energy` is the fraction of the
-    energy of the impulse response within its first nulls.
+    The formula depends on `model`. `power` is the required ISLR as a power ratio. `energy` is the energy of the
+    impulse response within its first nulls, as a fraction of its total energy.
     """
     if model == "published":
         return "ISLR", {"ISLR": power}
@@ -55,13 +55,13 @@ def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict
 
 
 def _level(model: str, variance: str) -> str:
-    """Formula by `model` for the ISLR [dB] caused by a phase variance; `variance` is the symbol of the variance."""
+    """Formula, according to `model`, for the ISLR [dB] due to a phase variance with the symbol `variance`."""
     ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
     return f"10*log({ratio})/log(10)"
 
 
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the ISLR and its allowable.
+    """Yield the explanation steps for the ISLR due to all errors, and for its allowable.
 
     The ISLR follows from the sum of all phase variances that spread power.
     """
@@ -102,9 +102,10 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Yield the explanation steps for the power that tones and the cubic phase spread.
+    """Yield the explanation steps for the power that is spread by tones and by the cubic phase.
 
-    Tones are left out if PSLR is required. The cubic phase is left out if the mission has a requirement on it.
+    Tones are left out if the mission has a requirement on PSLR. The cubic phase is left out if the mission has a
+    requirement on the cubic phase.
     """
     powers = [
         Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
@@ -128,9 +129,9 @@ def _tones_and_cubic(
 
 
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the highest echo that all tones cause together.
+    """Yield the explanation steps for the highest paired echo that all tones cause together.
 
-    The tones have their worst relative phases.
+    The tones are assumed to have their worst relative phases.
     """
     all_tones = tones(mission)
     echo = highest_echo(all_tones)
@@ -169,7 +170,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
 def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
     """Text with the peak phase of a tone, or with the root-sum-square of the peak phases of two tones.
 
-    `pair_tone` is the second tone, 90 degrees out of phase with the first, or None.
+    `pair_tone` is the second tone, 90 degrees out of phase with the first tone, or None if there is only one tone.
     """
     return number(tone.phase) if pair_tone is None else f"sqrt({number(tone.phase)}^2 + {number(pair_tone.phase)}^2)"
 
@@ -191,7 +192,7 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
     """Yield the explanation step that computes the utilization of a row in decibels, as a ratio of amplitudes.
 
-    There is no step for a row without a utilization.
+    Nothing is yielded for a row without a utilization.
     """
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
@@ -203,8 +204,9 @@ def use_of_amplitudes(row: Row) -> Iterator[Step]:
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
     """Yield the explanation steps that derive the displacement of the image by a tone.
 
-    The displacement follows from the orders 0 to 3 of the range error. Each item of `parts` is an axis or a folded
-    frequency and has its own step. `moved` is the total displacement east and north. [m]
+    The displacement follows from the polynomial orders 0 to 3 of the range error. Each item of `parts` is the part of
+    the tone along one axis or at one folded frequency. There is a step for each part. `moved` is the total
+    displacement, east and north. [m]
     """
     source = "(25)" if model == "published" else "exact ranges"
     for index, tone_part in enumerate(parts):
@@ -242,7 +244,7 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for a spur of an oscillator.
 
-    They give the paired echoes of the spur, and the level that the share of the requirement allows.
+    They show the level of the paired echoes of the spur, and the level allowed by the share of the requirement.
     """
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = OSCILLATOR_KIND.path(row.owner, row.subject.axis)
@@ -274,7 +276,10 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 
 
 def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
-    """Peak phase [rad] of a vibration at the limit for the platform of `row`, and the step that computes it."""
+    """Peak phase [rad] of a vibration at its limit, and the explanation step that computes it.
+
+    The limit applies to vibrations of the platform to which `row` belongs.
+    """
     values = {"A": float(limits.by(row.model or "published")), "λ": mission.radar.wavelength}
     phase = 2 * math.pi * values["A"] / values["λ"]
     by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
@@ -283,9 +288,9 @@ def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol:
 
 
 def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for a vibration of an oscillator.
+    """Yield the explanation steps for the effect of a vibration on an oscillator.
 
-    They give its echoes and the allowable acceleration sensitivity.
+    They show the paired echoes and the allowable acceleration sensitivity.
     """
     name, entry = row.owner, row.subject.entry or 0
     tone = next(tone for tone in accelerated_tones(mission) if (tone.name, tone.entry) == (name, entry))
@@ -333,8 +338,8 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
     """Yield the explanation steps for the largest quadratic and cubic phase of a slow tone.
 
-    A tone is slow below three cycles per aperture. `free` is the peak phase of the tone without synchronization.
-    [rad]
+    A tone is slow if it has less than three cycles per aperture. `free` is the peak phase of the tone without
+    synchronization. [rad]
     """
     T = mission.collection.aperture_time
     near = [
@@ -357,10 +362,11 @@ def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Ste
 def near_phases(
     mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
 ) -> Iterator[Step]:
-    """Yield the explanation steps for the size of a slow tone that the quadratic and cubic phase limits allow.
+    """Yield the explanation steps for the size of a slow tone that the limits on its phases allow.
 
-    There are no steps for a tone of three cycles per aperture or more. `judged` is the quadratic phase [rad]. The
-    allowed size is added to `sizes` under the key `by_phases`.
+    The limits apply to the quadratic and to the cubic phase. Nothing is yielded for a tone of three cycles per
+    aperture or more. `judged` is the quadratic phase [rad]. The allowed size is added to `sizes` under the key
+    `by_phases`.
     """
     limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
     if not judged and not row.cubic_rad:
@@ -384,7 +390,7 @@ def near_phases(
 def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
     """Return the explanation step for the allowable of a tone, which is the smallest of `sizes`.
 
-    The keys of `sizes` are symbols in the explanation, such as `by_echoes`.
+    The keys of `sizes` are the symbols in the explanation, such as `by_echoes`.
     """
     formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
     return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
@@ -393,7 +399,7 @@ def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for an error that is stated by its ISLR.
 
-    They give the RMS phase error that causes the same ISLR, and the limit of this phase.
+    They show the RMS phase error that causes the same ISLR, and the limit on this phase.
     """
     index, model = row.subject.entry or 0, row.model or "full"
     power = next(each for each in stated_powers(mission) if each.subject == row.subject)
@@ -416,5 +422,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """Return the step which states that an error is declared by its effect on the image, whatever its cause."""
+    """Return the explanation step for an error that is declared only by its effect on the image."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

@@ -1,4 +1,4 @@
-"""Explain a row or a requirement: its line in the mission file, the equations with numbers, and the status."""
+"""Explain a row or a requirement: its line in the mission file, the equations with numbers, and its status."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -94,7 +94,7 @@ def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
 def explain_requirement(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> str:
     """Explain a requirement of a mission as text.
 
-    The text gives its status, its line in the file, and the rows that determine the status.
+    The text states its status, its line in the file, and the rows that determine the status.
     """
     title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}{printable(own_id(requirement))}"
     return _text(
@@ -121,10 +121,10 @@ def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
 
 
 def _fitted(line: str) -> list[str]:
-    """Wrap a line of an explanation at spaces.
+    """Break a line of an explanation at spaces if it is too long.
 
-    Continuation lines are indented further. No line is broken between `=` and the next word, or between a number and
-    its unit.
+    Continuation lines have a larger indentation. An `=` stays on one line with the next word, and a number with its
+    unit.
     """
     start = len(line) - len(line.lstrip())
     if not start:
@@ -174,7 +174,8 @@ def _model(row: Row) -> str:
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
     """Yield the explanation steps for the quantities of a mission that depend only on the geometry.
 
-    These are the look direction (11), the smear direction (31) and det Q, the determinant of the matrix in (30).
+    These are the look direction of equation (11), the smear direction of (31), and det Q, the determinant of the
+    matrix in (30).
     """
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
@@ -197,7 +198,7 @@ def collection_chain(findings: MissionFindings) -> Iterator[Step]:
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for the allowable of an error.
 
-    The allowable is the smallest of the sizes that the requirements allow.
+    The allowable is the smallest of the sizes allowed by the requirements.
     """
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_allowed(source.owner)
@@ -247,10 +248,10 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 
 
 def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for a vibration, with the results in the unit of the file.
+    """Yield the explanation steps for a vibration, with the results in the unit used in the file.
 
-    If the file states a spectral line as an acceleration, the steps are in metres, and the results are converted
-    back.
+    If a spectral line is stated as an acceleration, the steps are in metres, and the results are converted back to an
+    acceleration.
     """
     mission, allocation, tone = analysis.mission, findings.allocation, analysis.slow_tones.get(row.id)
     lines = lines_of(mission, row.owner)
@@ -269,7 +270,7 @@ def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: R
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """Yield the explanation steps for a vibration: its line in the file, and its limits by both models.
+    """Yield the explanation steps for a vibration: its line in the mission file, and its limits by both models.
 
     The vibration is a single spectral line, the sum of several neighbouring lines, or noise.
     """
@@ -364,7 +365,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
 def _limit(
     model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
 ) -> Iterator[WorkedEquation]:
-    """Yield the equations for the largest vibration amplitude [m] that a model allows.
+    """Yield the equations for the largest vibration amplitude that a model allows. [m]
 
     If `is_power` is true, the formula gives an RMS value, and a second equation multiplies it by √2.
     """
@@ -415,7 +416,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Equation that adds the `phases` [rad] of all axes of a vibration; `symbol` is the symbol of the sum."""
+    """Equation that adds the `phases` [rad] along all axes of a vibration; `symbol` is the symbol of the sum."""
     numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
@@ -434,9 +435,10 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """Yield the explanation step that projects a vibration on the line of sight.
+    """Yield the explanation step that projects a vibration onto the line of sight.
 
-    For a receiver with a direct path, the step instead gives the effect on the range minus the direct path.
+    If the receiver uses the direct path as its clock, the step instead shows the effect of the vibration on the
+    difference between the range and the direct path.
     """
     vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
@@ -464,9 +466,9 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    """Yield the explanation step that adds the echoes of neighbouring spectral lines.
+    """Yield the explanation step that adds the paired echoes of neighbouring spectral lines.
 
-    They are added at the point where their sum is highest.
+    They are added at the place where their sum is highest.
     """
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
@@ -504,9 +506,9 @@ def _islr(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[S
 
 
 def _specification(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for a specification.
+    """Yield the explanation steps for a specification, which is the largest permitted size of an error.
 
-    They give its line in the file, and the largest declared error, which is compared with it.
+    They show its line in the file, and the largest declared error, which is compared with it.
     """
     mission = analysis.mission
     key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
@@ -521,7 +523,7 @@ def _declarations(analysis: Analysis, findings: MissionFindings, row: Row) -> It
 
 
 def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the sum of the quadratic phases and for its limit.
+    """Yield the explanation steps for the sum of the quadratic phases, and for the limit on this sum.
 
     The limit is the pull-in range of autofocus.
     """
@@ -534,9 +536,10 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the combined quadratic phase of all errors of one owner, such as the receiver.
+    """Yield the explanation steps for the combined quadratic phase of all errors that belong to one platform.
 
-    Further steps explain the limit of this phase.
+    For some rows, they are the errors of the clock or of the mission instead. Further steps explain the limit on this
+    phase.
     """
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
@@ -575,9 +578,9 @@ def _cubic_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) ->
 
 
 def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the quadratic phase over the band that ionospheric dispersion causes.
+    """Yield the explanation steps for the quadratic phase over the band that is caused by ionospheric dispersion.
 
-    It is given for each leg and for both legs together.
+    It is shown for the signal path of each platform and for both paths together.
     """
     mission = analysis.mission
     legs = dispersed_legs(mission, mission.geometry)
@@ -607,7 +610,7 @@ def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iter
 def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for the spatial variance of the quadratic phase.
 
-    It is the largest difference in quadratic phase between the edge and the centre of the scene.
+    The spatial variance is the largest difference in quadratic phase between the edge and the centre of the scene.
     """
     scene = findings.scene
     if scene is None or scene.degeneracy or row.declared is None:
@@ -650,9 +653,9 @@ def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row)
 
 
 def _unstated(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield no steps.
+    """Yield nothing for a flight log whose processing is not stated in the mission file.
 
-    The file does not state how the log is processed, so its residual cannot be explained.
+    The residual of the log cannot be explained if the processing is not known.
     """
     yield from ()
 
@@ -692,7 +695,7 @@ _EFFECT_TITLES = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "t
 def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
     """Yield the explanation steps for a requirement.
 
-    They give its line in the file and the rows that determine its status.
+    They show its line in the file and the rows that determine its status.
     """
     path = ("requirements", requirement.key)
     if requirement.key == DECLARE:
@@ -712,9 +715,9 @@ def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedR
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """Yield the explanation steps with the errors that the file must declare.
+    """Yield the explanation step that lists the errors the file must declare.
 
-    A second step lists the errors among them that are missing in the file.
+    A second step lists the errors that must be declared, but are missing in the file.
     """
     yield from _asked_for(mission)
     missing_keys = [declaration.lacks or declaration.key for declaration in missing_declarations(mission)]
@@ -729,7 +732,7 @@ def _asked_for(mission: Mission) -> Iterator[Step]:
 def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for a row that could not be judged.
 
-    The reason is an effect without a requirement, a platform path that may be wrong, or an unknown displacement.
+    The reason may be an effect without a requirement, a platform path that may be wrong, or an unknown displacement.
     """
     analysis = findings.analysed()
     mission, reason = analysis.mission, _reason(findings, row)
@@ -753,8 +756,8 @@ def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
 def _air_that_changes(reason: Note) -> Step:
     """Return the explanation step for atmospheric delays that are declared constant.
 
-    It gives the effect that the delays would have if they changed over time, and this effect as a fraction of the
-    allowable.
+    The step states the effect that the delays would have if they changed over time, and this effect as a fraction of
+    the allowable.
     """
     values: Sequence[SectionValue] = reason.values
     _, correlation_time, key, size, use, _ = values
@@ -768,7 +771,7 @@ def _air_that_changes(reason: Note) -> Step:
 def _reason(findings: MissionFindings, row: Row) -> Note | None:
     """Reason why a row is not judged or is waived; None if there is no such reason.
 
-    For an undeclared row, it is the reason for the requirement with the same id.
+    For a row without a declared value, the reason is taken from the requirement with the same id.
     """
     if row.status in ("not_evaluated", "waived"):
         return row.reason
@@ -782,7 +785,7 @@ def _reason(findings: MissionFindings, row: Row) -> Note | None:
 def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[Step]:
     """Yield the explanation steps for an effect that is not limited by any requirement.
 
-    They give the total size of the effect, the size below which it is negligible, and the contribution of the row.
+    They show the total size of the effect, the size below which it is negligible, and the contribution of the row.
     """
     effect_name = untaken.effect
     totals = []
@@ -818,7 +821,7 @@ def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[S
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for a platform path that may be wrong.
 
-    They give the possible error of the path and the declared position errors.
+    They show the possible error of the path and the declared position errors.
     """
     for doubt in input_doubts(mission):
         if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.state):
@@ -846,9 +849,10 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _of_log(doubt: InputDoubt) -> Step:
-    """Return the explanation step for a doubtful flight log.
+    """Return the explanation step for a flight log that may be inaccurate.
 
-    It gives the residual of the log or the resolution of its fixes, and the largest negligible value.
+    The step states the residual of the log or the rounding step of its fixes, and the largest value that is
+    negligible.
     """
     if doubt.is_phase:
         title = f"Residual of the {doubt.owner}’s smoothed log along the line of sight, rms phase"
@@ -859,17 +863,14 @@ def _of_log(doubt: InputDoubt) -> Step:
 
 
 def _stated_by_source(doubt: InputDoubt) -> Step:
-    """Return the explanation step that compares two errors of a path.
-
-    They are the error stated by the source of the path and the declared error.
-    """
+    """Return the explanation step that compares the error stated by the source of a path with the declared error."""
     title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
     sizes = {"stated": doubt.doubt, "declared": doubt.declared}
     return step(title, *(f"{name} = {with_unit(size, doubt.unit)}" for name, size in sizes.items()))
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Yield the step with the phases of clock errors whose displacement of the image is unknown."""
+    """Yield the explanation step for clock errors whose displacement of the image is unknown, with their phases."""
     model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:

@@ -1,8 +1,8 @@
 """Write the steps and formulas of an explanation, with numbers, as text, MathML or LaTeX.
 
-The formulas of the derivation are typeset in `catalogue`. Other formulas, such as a projection on an axis or a sum
-over both platforms, occur only in explanations. They are plain text with the operators + - * / ^, brackets, | |,
-sqrt and log, and with symbols such as β̃_2.
+The formulas of the derivation come from `catalogue`, where they are already typeset. Other formulas, such as a
+projection on an axis or a sum over both platforms, occur only in explanations. These formulas are plain text with the
+operators + - * / ^, brackets, | |, sqrt and log, and with symbols such as β̃_2.
 """
 
 import re
@@ -47,7 +47,7 @@ class Node(NamedTuple):
 
 
 class Language(NamedTuple):
-    """Templates for writing formulas in an output language, with `%s` for each child of an operation.
+    """Templates for writing formulas in an output language. A template has a `%s` for each child of an operation.
 
     `catalogue_index` is the index of the language in each entry of the catalogue.
     """
@@ -107,9 +107,9 @@ LATEX = Language(
 
 @lru_cache(maxsize=256)
 def is_mathematical(formula: str) -> bool:
-    """Whether all symbols of a formula are letters.
+    """Whether all symbols of a formula are letters, so that the formula can be typeset.
 
-    Formulas with words, such as budget times share, are not typeset.
+    Formulas in words, such as budget times share, are not typeset.
     """
     try:
         parsed(formula)
@@ -189,7 +189,7 @@ def symbol(name: str, language: Language) -> str:
 
 
 def _bare(node: Node) -> Node:
-    """Remove the outer brackets of a node, since the numerator and denominator of a fraction need none."""
+    """Remove the outer brackets of a node, which are not needed in the numerator or denominator of a fraction."""
     return node.children[0] if node.kind == "brackets" else node
 
 
@@ -282,7 +282,7 @@ def motion_coefficients(state: StateKind, axis: str, platform: str) -> dict[int,
 
 
 def motion_phase(state: StateKind, axis: str, platform: str) -> str | None:
-    """Formula in Table II for a motion error; None for a position error, which has no quadratic phase."""
+    """Formula in Table II for the quadratic phase of a motion error; None for position errors, which cause no QPE."""
     return TEXTS.get(f"Table II {motion_symbol(state, axis, platform)} 0")
 
 
@@ -295,7 +295,7 @@ def clock_coefficient(order: int) -> str:
 
 
 def inertial_phases(symbol: str) -> tuple[str, ...]:
-    """Formulas of the quadratic phase, cubic phase and residual that an inertial sensor error causes.
+    """Formulas for the quadratic phase, the cubic phase and the residual due to an inertial sensor error.
 
     `symbol` is the symbol of the error. A formula is empty if the error has no such phase.
     """
@@ -303,14 +303,14 @@ def inertial_phases(symbol: str) -> tuple[str, ...]:
 
 
 def amplitude_share(platform: str) -> str:
-    """Formula for the contribution of a platform to the echo amplitude that both platforms cause together."""
+    """Formula for the amplitude that one platform contributes to a paired echo caused by both platforms."""
     return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
     """A formula as text, with the values of its symbols and its result.
 
-    If the result is a given number, the formula is empty.
+    The formula is empty if the result is given directly, as a number.
     """
 
     symbol: str
@@ -323,7 +323,7 @@ class WorkedEquation(NamedTuple):
     def lines(self) -> tuple[str, ...]:
         """Two lines with aligned equals signs: the formula with symbols, and the formula with numbers and result.
 
-        A given number is written on a single line.
+        A result without a formula is written on a single line.
         """
         if not self.formula:
             return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
@@ -358,7 +358,7 @@ def step(title: str, *body: WorkedEquation | str) -> Step:
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:
-    """Replace the symbols of a formula by numbers with six digits, and put brackets around negative numbers."""
+    """Replace the symbols of a formula by their values with six digits, with brackets around negative values."""
     names = sorted(values, key=len, reverse=True)
     # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
     pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
@@ -366,7 +366,7 @@ def filled(formula: str, values: Mapping[str, float]) -> str:
 
 
 def number(value: float) -> str:
-    """Write a number with six digits, and with brackets if it is negative."""
+    """Write a number with six digits, in brackets if it is negative."""
     text = six_digits(value)
     return f"({text})" if text.startswith("-") else text
 
@@ -406,7 +406,7 @@ def as_text(equation: WorkedEquation) -> Typeset:
 
 
 def readable(text: str) -> str:
-    """Replace the operators of a programming language by mathematical signs, such as `*` by ·."""
+    """Replace the operators of a programming language by mathematical signs, such as `*` by `·`."""
     return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
 
 
@@ -430,7 +430,7 @@ def as_mathml(equation: WorkedEquation) -> Typeset:
 
 
 def as_latex(equation: WorkedEquation) -> Typeset:
-    """Write an equation as LaTeX in two lines, aligned at their first `=`, without delimiters."""
+    """Write an equation as LaTeX without math delimiters, as two lines that are aligned at their first `=`."""
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{_number_in(LATEX, equation.result)}{unit}"
     formula, numbers = _in_letters_and_numbers(equation, LATEX)
@@ -462,7 +462,8 @@ def catalogued(formula: str, language: Language) -> str:
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
     """Replace the symbols in a MathML formula by their values.
 
-    A negative number is put in brackets, and so is a number with a power of ten if the formula raises it to a power.
+    Negative values get brackets. So does a value that is written with a power of ten, if the formula raises it to a
+    power.
     """
 
     def filled_match(match: re.Match[str]) -> str:

@@ -1,8 +1,8 @@
 """Annotate mission files with the findings that need attention: as GitHub workflow commands and as SARIF 2.1.0.
 
-Each finding points to a value in the mission file. Rows are left out if they pass, have no requirement to check or
-are not declared. A requirement is a finding if it is broken or waived and its rows do not show this status. Overrides
-from outside a mission file are a finding as well.
+Each finding points to a value in the mission file. Rows are left out if they pass, if no requirement applies to them,
+or if they are not declared. A requirement that is broken or waived is a separate finding if none of its rows has the
+same status. If values from outside override the mission file, this is also reported as a finding.
 """
 
 import json
@@ -54,9 +54,9 @@ class _Annotation(NamedTuple):
 def as_github(report: Report, style: Style) -> str:
     """Write one GitHub workflow command for each finding, worst first.
 
-    If there are no findings, a line that is not a command is written.
+    If there are no findings, the output is a single line, which is not a command.
 
-    The runner shows at most ten errors and ten warnings per step.
+    A GitHub runner shows at most ten errors and ten warnings per step.
     """
     annotations = sorted(
         _annotations(report, style), key=lambda annotation: _COMMANDS_WORST_FIRST.index(annotation.command)
@@ -87,7 +87,7 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
 
 
 def _finding(row: Row, mission: MissionFindings) -> str:
-    """Sentence about a row, with the ids of the broken or waived requirements that the row represents."""
+    """Sentence about a row, with the ids of its broken or waived requirements that have the same status."""
     ids = shown_ids(row, mission)
     return sentences(finding(row, mission), f"Requirement: {', '.join(ids)}" if ids else "")
 
@@ -220,7 +220,7 @@ _RULE_INDEX = {rule: index for index, rule in enumerate(ANNOTATION_RULES)}
 def as_sarif(report: Report, style: Style) -> str:
     """Write a SARIF log with one run, for code scanning and editors.
 
-    A waived finding is a result with a suppression. Faults of an unusable file are notifications of the tool.
+    A waived finding becomes a result with a suppression. Faults of an unusable file become tool notifications.
     """
     results: list[_Object] = []
     notifications = []
@@ -359,10 +359,10 @@ def _properties(mission: MissionFindings, **values: str | float | None) -> dict[
 def _located(
     rule: str, level: str, message: str, line: int | None, artifact: _Object, name: tuple[str, ...]
 ) -> _Object:
-    """Make a SARIF result with its location in the mission file and its fingerprint.
+    """Make a SARIF result, with its location in the mission file and with a fingerprint.
 
-    The fingerprint depends on the rule and on `name`, which identifies the finding and does not change when lines
-    move. The last item of `name` is the subject of the finding.
+    The fingerprint depends on `rule` and on `name`. `name` identifies the finding, and does not change when lines in
+    the file move. Its last item is the subject of the finding.
     """
     return {
         "ruleId": rule,

@@ -1,9 +1,9 @@
-"""Write requirements and rows as CSV for a spreadsheet: a header, then a line in SI units for each of them.
+"""Write requirements and rows as CSV for a spreadsheet: a header, and a line for each of them, in SI units.
 
 The column `kind` states whether a line is a requirement or a row. The line of a requirement has an id such as
-`requirement.islr`, the reached value in the column `declared`, the required value in `allowable`, and the deciding
-row in `decided_by`. If a share of the requirement decides, the utilization is the utilization of this share, and the
-columns `share_allowed` and `share_reached` have its values.
+`requirement.islr`. Its column `declared` has the reached value, `allowable` the required value, and `decided_by` the
+id of the deciding row. If the share of a platform or of the clock decides the status, the utilization refers to this
+share. The columns `share_allowed` and `share_reached` then have its allowed and its reached value.
 """
 
 import csv
@@ -80,15 +80,15 @@ def lines_of(mission: MissionFindings | UnusableMission) -> Iterator[list[object
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write the lines of all missions below a header."""
+    """Join the lines of all missions below a header."""
     return csv_text([CSV_COLUMNS]) + "".join(piece.text for piece in pieces)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Write rows as lines of CSV.
+    """Write rows of values as lines of CSV.
 
-    None becomes an empty cell. Numbers are written with all digits that are needed to reproduce them. An apostrophe
-    is put before text that a spreadsheet would run as a formula.
+    None becomes an empty cell. Numbers are written with all digits that are needed to reproduce them exactly. An
+    apostrophe is put before text that a spreadsheet would execute as a formula.
     """
     output = io.StringIO()
     harmless = ([spreadsheet_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)

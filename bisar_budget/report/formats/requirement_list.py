@@ -1,8 +1,8 @@
 """Write the requirements of missions with their status as CSV.
 
-The columns are the columns of a requirements file, followed by further columns. A line has a requirement id of the
-project and the requirement or row to which it is assigned. A requirement without such an id has a line of its own. A
-mission reads the file with `requirements: {file: …}` and ignores the columns after `limit`.
+The first columns are the same as in a requirements file. A line contains a requirement id of the project and the
+requirement or row to which the id is assigned. A requirement without such an id has a line of its own. A mission can
+read the CSV file with `requirements: {file: …}`; the columns after `limit` are then ignored.
 """
 
 import math
@@ -25,7 +25,10 @@ _STATUS_COLUMNS = (
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the lines of a mission, without the header. A file that cannot be used has a line with its status."""
+    """Write the lines of a mission, without the header.
+
+    For a mission file that cannot be used, a single line with its status is written.
+    """
     if isinstance(mission, UnusableMission):
         faults = "; ".join(map(str, mission.faults))
         return csv_text([["", "", "", "", mission.status, "", "", "", mission.file, faults, ""]])
@@ -60,7 +63,7 @@ def _or_empty(cell: str) -> str:
 
 
 def limit_of_file(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Limit of a requirement as written in the file, or with all digits if the file does not state it."""
+    """Limit of a requirement as written in the mission file, or with full precision if the file does not state it."""
     if requirement.key == DECLARE or requirement.value is None:
         return ", ".join(mission.kinds.required)
     if isinstance(requirement.line, Place) and not requirement.is_default and requirement.line.text:

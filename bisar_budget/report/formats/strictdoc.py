@@ -1,6 +1,7 @@
-"""Write documents for StrictDoc: the requirements of missions, with the results of their check.
+"""Write documents for StrictDoc that contain the requirements of missions and the results of their check.
 
-The syntax is that of StrictDoc 0.30 (user guide, "Document syntax"). Texts are plain, not reStructuredText.
+The syntax is that of StrictDoc 0.30 (user guide, "Document syntax"). Texts are written as plain text, not as
+reStructuredText.
 """
 
 import re
@@ -37,9 +38,9 @@ def strict_document(title: str, grammar: Mapping[str, Mapping[str, bool]], nodes
     title : str
         Title of the document.
     grammar : mapping
-        Fields of the nodes by tag; for each field, whether it is required.
+        For each node tag, a mapping from the names of its fields to booleans that are true for required fields.
     nodes : iterable of StrictNode
-        The nodes, in order.
+        Nodes in the order of the document.
     """
     lines = ["[DOCUMENT]", f"TITLE: {printable(title)}", "OPTIONS:", "  MARKUP: Text", "", "[GRAMMAR]", "ELEMENTS:"]
     for tag, fields in grammar.items():
@@ -58,7 +59,7 @@ def strict_document(title: str, grammar: Mapping[str, Mapping[str, bool]], nodes
 
 
 def strict_uid(own_id: str) -> str:
-    """Requirement id of the project as a UID; characters that StrictDoc does not accept become underscores."""
+    """Convert a requirement id of the project to a UID. Characters that StrictDoc rejects become underscores."""
     uid = re.sub(r"[^\w()\-/.: ]", "_", own_id.strip())
     return uid if re.match(r"\w", uid) else f"_{uid}"
 
@@ -83,7 +84,10 @@ _UidName = tuple[str, ...]  # an id of the project, or the name of a finding as 
 
 @dataclass
 class _Required:
-    """A requirement node of the document. Several missions, mission requirements and rows may share a node."""
+    """A requirement node of the document.
+
+    Several missions may share a node, as may several requirements and rows of a mission.
+    """
 
     titles: list[str] = field(default_factory=list)
     statements: list[str] = field(default_factory=list)
@@ -93,7 +97,7 @@ class _Required:
     findings: list[str] = field(default_factory=list)
 
     def node(self, uid: str) -> StrictNode:
-        """Node of the requirement with the given UID. Its status is the worst of all its statuses."""
+        """Make the node with the given UID. Its status is the worst status in `statuses`."""
         fields = {"UID": uid, "STATUS": worst(self.statuses), "TITLE": _unique(self.titles)}
         texts = {"STATEMENT": _unique(self.statements, " "), "KEY": _unique(self.keys), "LIMIT": _unique(self.limits)}
         return StrictNode(fields | texts | {"COMMENT": _unique(self.findings)})
@@ -101,7 +105,7 @@ class _Required:
 
 @dataclass
 class _Result:
-    """Result of a check, and the names of its parent requirements."""
+    """A result node of the document, with the names of the requirements that are its parents."""
 
     status: str
     title: str
@@ -111,17 +115,17 @@ class _Result:
 
 
 def _unique(texts: Sequence[str], separator: str = "; ") -> str:
-    """Join the distinct non-empty strings."""
+    """Join the strings that are not empty. A string that occurs several times is written once."""
     return separator.join(dict.fromkeys(filter(None, texts)))
 
 
 def as_sdoc(report: Report, style: Style) -> str:
-    """Write the requirements of missions, each with the results that decide its status as nodes below it.
+    """Write the requirements of missions as nodes, and the results that decide their status as child nodes.
 
     A requirement has the ids that the project gives it, or else an id as in `needs.json`. If several requirements,
-    rows or missions share an id, they have a common node with the worst status. A result is the row that decides a
-    requirement, a row with an id of the project, or a requirement that no row decides. A mission file that cannot be
-    used is a result without a requirement.
+    rows or missions share an id, they have a common node with the worst of their statuses. A result node is written
+    for a row that decides a requirement, for a row with a requirement id of the project, and for a requirement that
+    no row decides. For a mission file that cannot be used, there is a result without a requirement.
     """
     required: dict[_UidName, _Required] = {}
     results: dict[_UidName, _Result] = {}
@@ -151,9 +155,9 @@ def _add_requirements(
     required: dict[_UidName, _Required],
     results: dict[_UidName, _Result],
 ) -> None:
-    """Add the requirements of a mission, each with the row that decides it.
+    """Add the requirements of a mission to `required`, and the rows that decide them to `results`.
 
-    If there is no such row, the requirement is added with a result of its own.
+    If no row decides a requirement, the requirement itself is added to `results`.
     """
     rows = {row.id: row for row in mission.rows}
     for requirement in mission.requirements:
@@ -183,7 +187,7 @@ def _add_rows(
     required: dict[_UidName, _Required],
     results: dict[_UidName, _Result],
 ) -> None:
-    """Add the requirement ids that a mission assigns to rows, with the results of these rows."""
+    """Add the requirement ids of a mission's rows to `required`, and the results of these rows to `results`."""
     for row in mission.rows:
         for own_id in row.requirement_ids:
             node = required.setdefault((own_id,), _Required())
@@ -195,7 +199,7 @@ def _add_rows(
 
 
 def _result_of(row: Row, mission: MissionFindings, identity: Identity, results: dict[_UidName, _Result]) -> _Result:
-    """Result of a row. It is added to `results` if it is missing there."""
+    """Return the result of a row. If `results` does not contain it yet, it is added."""
     texts = (f"{row.id} of {mission.name}", finding(row, mission), _origin_words(row.line, mission, identity))
     return results.setdefault(identity.of(row.id), _Result(row.status, *texts))
 
@@ -205,12 +209,15 @@ def _origin_words(line: int | None, mission: MissionFindings, identity: Identity
 
 
 def _text_of(name: _UidName, mission: MissionFindings) -> str:
-    """Text of the mission for a requirement id of the project; empty if `name` is the name of a finding."""
+    """Text that a mission file gives for a requirement id that the project uses.
+
+    The text is empty if the file gives no text for the id, or if `name` refers to a finding without such an id.
+    """
     return mission.requirement_texts.get(name[0], "") if len(name) == 1 else ""
 
 
 def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Write a sentence for a requirement that has no text of its own."""
+    """Write a sentence that states a requirement for which the project gives no text."""
     limit = limit_of_file(requirement, mission)
     if requirement.key == DECLARE:
         return f"The mission file shall declare the errors {limit}."
@@ -218,7 +225,10 @@ def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
 
 
 def _row_sentence(row: Row, mission: MissionFindings) -> str:
-    """Write a requirement sentence for a row that has no text of its own."""
+    """Write a sentence that states the limit of a row as a requirement.
+
+    It is used if the project gives no text for the requirement.
+    """
     if row.allowable is None:
         return f"{row.id} shall comply with the budget."
     return f"{row.id} shall be at most {row_limit(row, mission)}."

@@ -23,13 +23,13 @@ _NamedNeed = tuple[tuple[str, ...], dict[str, object]]  # name and fields of a n
 def as_junit(report: Report, style: Style) -> str:
     """Write a test suite for each mission, with a test case for each requirement and row.
 
-    The report is for GitLab, Jenkins and requirements tools. The schema is Jenkins' junit-10, with properties of test
-    cases as pytest writes them. A broken requirement is a failure, a row that checks no requirement is skipped, and
-    an unusable file is an error. A test case with a warning passes, with a remark in its output. All times are 0, so
-    that identical runs give identical reports.
+    The output can be read by GitLab, Jenkins and requirements tools. It follows the schema junit-10 of Jenkins; test
+    cases have properties, as in the output of pytest. A broken requirement is a failure, a row that checks no
+    requirement is skipped, and an unusable file is an error. A test case with a warning passes, and its output
+    contains a remark. All times are 0, so that identical runs give identical reports.
 
-    To keep the file small (a fleet may have 10⁵ rows), lines are not indented, and a row without a verdict has only
-    its values as properties.
+    To keep the file small (a set of missions may have 10⁵ rows), lines are not indented, and a row without a verdict
+    has no properties apart from its values.
     """
     counts: Counter[str] = Counter()
     suites: list[str] = []
@@ -88,7 +88,7 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
 
 
 def _waived_by(judged: MissionFindings | JudgedRequirement | Row) -> str | None:
-    """Ids of the waivers in force, spelled as in the file; None without a waiver."""
+    """Ids of the waivers that apply, spelled as in the mission file; None if there is no waiver."""
     return "; ".join(waiver.id for waiver in judged.waived_by) or None
 
 
@@ -157,9 +157,9 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """Yield the XML element with the outcome of a test case: failure, skip or remark.
+    """Yield the XML element for the outcome of a test case: failure, skip or remark.
 
-    There is no element for a test case that passes without a remark.
+    No element is written if the test case passes without a remark.
     """
     status = STATUS[status_name]
     if status.junit == "failure":
@@ -197,10 +197,11 @@ def _class_name(identity: Identity) -> str:
 
 
 def as_needs(report: Report, style: Style) -> str:
-    """Write `needs.json` with a need for each requirement and row; an unusable file is one need of status `error`.
+    """Write `needs.json` with a need for each requirement and row.
 
-    Needs use only fields that every project of Sphinx-Needs has, so that an import gives no warning. The requirement
-    ids of the project become links. Numbers are in the content, which Sphinx reads as reStructuredText.
+    An unusable file is a single need of status `error`. Needs have only fields that every Sphinx-Needs project
+    defines, so that importing them gives no warnings. The requirement ids of the project become links. Numbers are
+    part of the content, which Sphinx reads as reStructuredText.
     """
     needs: list[_NamedNeed] = []
     for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
@@ -241,7 +242,7 @@ def identifier(prefix: str, name: tuple[str, ...]) -> str:
 def _unused(identifier: str, needs: Container[str]) -> str:
     """Make an identifier unique.
 
-    If `needs` already contains it, for example because a file occurs twice, a number is appended, starting with 2.
+    If `needs` already contains it, for example because a file is given twice, a number is appended, starting with 2.
     """
     unique, number = identifier, 2
     while unique in needs:
@@ -283,7 +284,10 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, links: Sequ
 
 
 def origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
-    """Yield texts about the origin of a value: file and line, then changes and overrides from outside the file."""
+    """Yield strings about the origin of a value.
+
+    They give the mission, the file and the line, and then the changes and overrides from outside the file.
+    """
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"

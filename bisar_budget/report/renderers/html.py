@@ -26,7 +26,10 @@ _SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
 
 @cache
 def _page() -> Template:
-    """Load the template of the page from `resource("templates")`. Compiling it takes as long as a check."""
+    """Load the template of the page from `resource("templates")`.
+
+    It is loaded only when needed, because compiling it takes as long as a check.
+    """
     environment = Environment(
         loader=FileSystemLoader(resource("templates")),
         autoescape=True,
@@ -40,7 +43,7 @@ def _page() -> Template:
 
 
 def page(document: doc.AnswerDocument) -> str:
-    """Write the page of a document."""
+    """Write a document as an HTML page."""
     return _page().render(
         document=document,
         facts=_block(document.facts),
@@ -61,7 +64,7 @@ def _contents(chapters: Sequence[doc.Chapter]) -> list[tuple[doc.Chapter, list[d
 
 
 def _css_string(text: str) -> Markup:
-    """Write a CSS string. Characters other than ASCII letters, digits and blanks become numeric escapes."""
+    """Write text as a CSS string. Characters other than ASCII letters, digits and blanks become numeric escapes."""
     safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
     return Markup(f'"{"".join(safe)}"')
 
@@ -97,7 +100,7 @@ def _text(text: doc.Text) -> Markup:
 
 
 def _plain(text: str) -> Markup:
-    """Write text, in which a long word without a place to break gets some."""
+    """Write plain text as HTML. Line breaks are allowed within long words."""
     shown_text = printable(text)
     pieces = _LONG_WORD.sub("\\g<0>\n", shown_text).split("\n") if len(shown_text) > 30 else [shown_text]
     return Markup("<wbr>").join(pieces)
@@ -109,7 +112,7 @@ def _fill(width: float) -> str:
 
 # ---------------------------------------------------------------------- blocks
 def blocks_as_html(blocks: Iterable[doc.Block]) -> Markup:
-    """Write blocks one after another, for a page or a notebook."""
+    """Write blocks as HTML, one after another, for a page or a notebook."""
     return Markup("").join(map(_block, blocks))
 
 
@@ -159,7 +162,10 @@ def _element(tag: str, style: str, content: Markup) -> Markup:
 
 
 def _scroll(label: str, content: Markup) -> Markup:
-    """Wrap content in a region that can have the keyboard focus and scrolls if the content is wider than the page."""
+    """Wrap content in a region that can have the keyboard focus.
+
+    The region scrolls if its content is wider than the page.
+    """
     region = '<div class="scroll" tabindex="0" role="region" aria-label="{}">{}</div>'
     return Markup(region).format(printable(label), content)
 
@@ -183,7 +189,7 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
-    """Write a table cell, or an entry of a list of facts, as an element with the style class of its text."""
+    """Write a table cell, or an entry in a list of facts, as an HTML element that has the style class of its text."""
     content = _text(text)
     if isinstance(text, doc.Styled):
         style = text.style
@@ -232,9 +238,9 @@ def _stack(stack: doc.Stack) -> Markup:
 
 
 def _inline(figure: doc.Figure) -> Markup:
-    """Write the SVG of a drawing into the page.
+    """Return the SVG of a drawing for use within the page.
 
-    The ids in the drawing are prefixed with its anchor, because a report may contain a mission twice.
+    The ids in the drawing are prefixed with its anchor, because the same drawing may occur twice in a report.
     """
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
@@ -245,7 +251,7 @@ def _step(title: str, equations: Iterable[WorkedEquation | str | doc.Equality], 
 
 
 def _equation(equation: WorkedEquation | str | doc.Equality) -> Markup:
-    """Write an item of a derivation step: a formula as MathML, arithmetic and prose as text."""
+    """Write one item of a derivation step: a formula as MathML, and arithmetic or prose as text."""
     if isinstance(equation, doc.Equality):
         sides = (notation.catalogued(side, notation.MATHML) for side in (equation.left, equation.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))

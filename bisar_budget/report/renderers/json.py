@@ -15,7 +15,8 @@ def _encoder(separator: str) -> Callable[[object], str]:
 def indented(value: object, levels: int, margin: str = "") -> str:
     """Write a value as JSON in which only the outermost `levels` levels of nesting are indented.
 
-    With an indentation, `json.dumps` would run in pure Python and take as long as the check itself.
+    The `indent` argument of `json.dumps` is not used, because it would switch to the slow pure-Python encoder, which
+    takes as long as the check itself.
     """
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
         return _encoder(", ")(value)

@@ -1,4 +1,4 @@
-"""Write a document as Markdown for GitHub, readable as plain text; its drawings are separate files."""
+"""Write a document as Markdown for GitHub that is also readable as plain text. Drawings are separate files."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,7 +16,10 @@ _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
 def markdown(document: doc.AnswerDocument, assets: str) -> str:
-    """Write a document as Markdown. `assets` is the folder of its drawings; if empty, drawings are left out."""
+    """Write a document as Markdown.
+
+    `assets` is the folder of the drawings. If it is empty, drawings are left out.
+    """
     subject = "Motion-measurement error budget, bistatic SAR."
     texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], uri(assets))]
     return "\n\n".join(text.rstrip("\n") for text in texts if text) + "\n"
@@ -57,7 +60,7 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
 
 
 def _inside(text: doc.Text, badge: str) -> str:
-    """Write a piece of a line of text. Its leading spaces are kept, and the text after them is escaped."""
+    """Write part of a line of text. Its leading spaces are kept, and the text after them is escaped."""
     if isinstance(text, str):
         return " " * (len(text) - len(text.lstrip(" "))) + _text(text.lstrip(" "))
     return _text(text, badge)
@@ -71,7 +74,7 @@ def _bar(fraction: float) -> str:
 def _use(fraction: float) -> str:
     """Draw a utilization as a bar of characters with a mark at the limit.
 
-    An arrow shows that the utilization is beyond the end of the bar.
+    An arrow is appended if the utilization is beyond the end of the bar.
     """
     bar = _bar(min(1.0, fraction * _LIMIT_WIDTH / _BAR_WIDTH))
     return f"{bar[:_LIMIT_WIDTH]}┃{bar[_LIMIT_WIDTH:]}{'▶' if fraction > _BAR_WIDTH / _LIMIT_WIDTH else ''}"
@@ -151,7 +154,7 @@ def _table(table: doc.TextTable) -> str:
 
 
 def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
-    """Yield a LaTeX block for each formula, and a list of the texts between two formulas."""
+    """Yield formulas and texts in order: each formula as a LaTeX block, and successive texts as a list."""
     lines: list[str] = []
     for equation in equations:
         if latex := _latex(equation):
@@ -169,7 +172,7 @@ def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Itera
 
 
 def _latex(equation: WorkedEquation | str | doc.Equality) -> str:
-    """Write a formula as LaTeX. The result is empty for prose and for arithmetic."""
+    """Write a formula as LaTeX. The result is empty for prose or arithmetic."""
     if isinstance(equation, doc.Equality):
         return " = ".join(notation.catalogued(side, notation.LATEX) for side in (equation.left, equation.right))
     if isinstance(equation, WorkedEquation) and equation.formula and notation.is_formula(equation):

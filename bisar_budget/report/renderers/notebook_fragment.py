@@ -1,4 +1,4 @@
-"""Write a document as a fragment of HTML for a notebook, in the colours of the notebook's theme."""
+"""Write a document as an HTML fragment for a notebook, in the colours of the notebook's theme."""
 
 from bisar_budget import notebook
 from bisar_budget.findings.status import STATUS
@@ -11,6 +11,6 @@ _STATUS_TONES = "".join(
 
 
 def fragment(document: doc.AnswerDocument) -> str:
-    """Write the chapters of a document, one after another, with a style sheet of their own."""
+    """Write the chapters of a document as an HTML fragment that contains its own style sheet."""
     chapters = (f"{blocks_as_html(chapter.blocks)}" for chapter in document.chapters)
     return notebook.page(f"<style>{_STATUS_TONES}</style>", *chapters)

@@ -26,9 +26,9 @@ def text(document: doc.AnswerDocument, style: Style) -> str:
 
 # ---------------------------------------------------------------------- parts of a line
 def plain(line: doc.Text) -> str:
-    """Write a text without markup, in characters that every terminal has.
+    """Write text without markup, in characters that every terminal can show.
 
-    Bars and colour keys are left out, because they only repeat numbers.
+    Bars and colour swatches are left out, because they only repeat numbers.
     """
     if isinstance(line, str):  # nearly every text, and faster than the patterns below
         return printable(line).replace(" → ", " -> ")
@@ -126,7 +126,7 @@ def _opening(opening: doc.Opening, style: Style) -> Iterator[str]:
 def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
     """Yield the lines of a table. Statuses are coloured, and a missing value is a hyphen instead of a dash.
 
-    A name too long for the width of tables is written on a line above its values. If a sentence in the last column
+    If a name does not fit in its column, it is written on a line above its values. If a sentence in the last column
     does not fit, it is written on separate lines below the values.
     """
     heads = [[plain(head.text) for head in table.heads]]
@@ -167,7 +167,7 @@ def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
 
 
 def _coloured(row: doc.Line, text: str, style: Style) -> str:
-    """Colour the statuses of a row in `text`, which is the line of this row."""
+    """Colour the statuses of a row in `text`, which is the row as written in the table."""
     if not style.color:
         return text
     for column, cell in enumerate(row):

@@ -1,6 +1,6 @@
 """Write an answer as a workbook for Excel and similar programs: its text, its tables, and its numbers in SI units.
 
-The same answer always gives the same bytes.
+The same answer always gives the same file, byte for byte.
 """
 
 import re
@@ -60,9 +60,9 @@ def workbook(document: doc.AnswerDocument, records: Records) -> bytes:
 
 
 def _texts(document: doc.AnswerDocument) -> Iterator[list[str]]:
-    """Yield the cells of each line of text.
+    """Yield the cells of each line of the sheet that contains the text of the document.
 
-    A fact has two cells, for its name and its value. A line of another block has a single cell.
+    A fact has two cells, for its name and its value. Any other line has a single cell.
     """
     yield from ([plain(name), plain(value)] for name, value in document.facts.pairs)
     for block in doc.blocks_of(document):
@@ -132,7 +132,7 @@ def _append(sheet: "Worksheet", cells: Sequence[str | float | None], *, is_head:
 
 
 def _fit(sheet: "Worksheet") -> None:
-    """Make each column as wide as its longest text, up to a limit."""
+    """Make each column wide enough for its longest text, up to a limit."""
     from openpyxl.utils import get_column_letter
 
     for number, column in enumerate(sheet.columns, start=1):
@@ -141,7 +141,7 @@ def _fit(sheet: "Worksheet") -> None:
 
 
 def _undated(file: BytesIO) -> bytes:
-    """Return the bytes of a ZIP archive with the same files but without their dates."""
+    """Copy a ZIP archive without the dates of its files, and return its bytes."""
     undated = BytesIO()
     with ZipFile(file) as dated, ZipFile(undated, "w", ZIP_DEFLATED) as archive:
         for name in dated.namelist():

@@ -27,7 +27,7 @@ _NARROW_ANGLE_DEG = 30.0  # angle between range and Doppler gradients below whic
 
 
 class AboutMission(Protocol):
-    """Findings about a mission from a check or another study."""
+    """Facts about a mission for the heading of a report, which may be about a check or another study."""
 
     @property
     def file(self) -> str:
@@ -39,15 +39,15 @@ class AboutMission(Protocol):
 
     @property
     def changes(self) -> tuple[SetValue, ...]:
-        """Values from command-line options that replace values of the file."""
+        """Values from command-line options that replace values of the mission file."""
 
     @property
     def overrides(self) -> tuple[Override, ...]:
-        """Settings from outside the file that affect the mission."""
+        """Settings from outside the mission file that affect its result."""
 
 
 def rule_words(mission: MissionFindings) -> str:
-    """Text that names the model and the combination rule by which a mission is evaluated."""
+    """Text that names the model and the combination rule that are used to evaluate a mission."""
     return f"{_MODEL_WORDS[mission.model]}, {_COMBINATION_WORDS[mission.combine]}"
 
 
@@ -68,7 +68,7 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
 
 
 def other_overrides(mission: AboutMission) -> list[str]:
-    """Texts about the settings from outside the file, without `--set`. Each setting has its own text."""
+    """List of texts about the settings from outside the mission file, one for each setting, without `--set`."""
     return _overrides(mission, with_changes=False)
 
 
@@ -107,7 +107,7 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
 
 
 def doubtful_model(mission: MissionFindings) -> str:
-    """Sentence that says why the published model may be invalid for this mission; empty if it is valid."""
+    """Sentence about why the published model may be invalid for this mission; empty if the model is valid."""
     doubt = mission.model_doubt
     return f"{sentence(doubt)}." if doubt else ""
 
@@ -171,7 +171,7 @@ def _peak_loss(loss_db: float) -> str:
 
 
 def path_words(path: FlownPath) -> str:
-    """Text about a platform path: its source, the fitted polynomials, and the deviation from fixes or orbit."""
+    """Text about a platform path: its source, the fitted polynomials, and their deviation from the fixes or orbit."""
     text = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
         direction = "old" if path.age >= 0 else "ahead"

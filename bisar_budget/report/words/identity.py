@@ -1,8 +1,8 @@
 """Name a mission and its findings in a way that does not depend on the current folder or the machine.
 
-The names are used for the ids of needs, fingerprints and test cases. The name of a mission is the number of its
-document, else the path of its file within the repository, else the file name. A relative path, an absolute path and a
-symbolic link to the same file all give the same name.
+The names are used as ids of needs (requirement items of Sphinx-Needs) and test cases, and for fingerprints. The name
+of a mission is the number of its document. If there is none, it is the path of its file within the repository, or
+else the file name. A relative path, an absolute path and a symbolic link to the same file all give the same name.
 """
 
 import os
@@ -20,7 +20,7 @@ _STANDARD_INPUT = "standard input"
 class Identity(NamedTuple):
     """Name of a mission, unique among the files of a run, and the path of its file in reports.
 
-    `shared` holds the pairs of requirement id and row id that identify a finding only together with the mission name.
+    `shared` holds pairs of a requirement id and a row id that identify a finding only if the mission name is added.
     """
 
     name: str
@@ -28,10 +28,10 @@ class Identity(NamedTuple):
     shared: frozenset[tuple[str, str]] = frozenset()
 
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
-        """Unique name of a row or requirement: its first requirement id in the project, and its id `subject`.
+        """Unique name of a row or requirement: its first requirement id in the project, and its own id `subject`.
 
-        If it has no requirement id, the mission name replaces it. If the pair is in `shared`, the mission name is
-        inserted between both ids.
+        If the project assigns no requirement id, the mission name is used instead. If the pair of ids is in `shared`,
+        the mission name is inserted between them.
         """
         if requirement_id is None:
             return self.name, subject
@@ -61,7 +61,7 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
 
 
 def digest(*items: str) -> str:
-    """SHA-256 digest of a name, the same on every machine.
+    """SHA-256 digest of the parts of a name. It is the same on every machine.
 
     File names that are not valid UTF-8 are accepted.
     """
@@ -71,7 +71,7 @@ def digest(*items: str) -> str:
 
 
 def distinct(spellings: Sequence[str], names: Sequence[tuple[str, ...]]) -> list[str]:
-    """Make the spellings of `names` unique. If several names have the same spelling, each gets a digest appended."""
+    """Make the spellings of `names` unique. If several names have the same spelling, a digest is appended to each."""
     uses = Counter(spelling for spelling, _ in set(zip(spellings, names, strict=True)))
     return [
         spelling if uses[spelling] == 1 else f"{spelling}_{digest(*name)[:8].upper()}"
@@ -80,14 +80,14 @@ def distinct(spellings: Sequence[str], names: Sequence[tuple[str, ...]]) -> list
 
 
 def stem(name: str) -> str:
-    """Name of a mission without the ending of its file."""
+    """Name of a mission without the extension of its file."""
     return name.removesuffix(".yaml").removesuffix(".yml")
 
 
 def source_path(file: str, style: Style) -> str:
-    """Path of a mission file in a report: relative to its repository, else to `style.root`, else absolute.
+    """Path of a mission file in a report: relative to its repository, or else to `style.root`, or else absolute.
 
-    It has forward slashes. If `style.root` is empty, the path is returned as given.
+    The path has forward slashes. If `style.root` is empty, the path is returned as given.
     """
     if not style.root or file == "-":
         return file.replace(os.sep, "/")
@@ -103,7 +103,7 @@ def source_path(file: str, style: Style) -> str:
 class _FileLocation(NamedTuple):
     """Absolute path of a file with links resolved, and a path that is the same on every machine.
 
-    `portable_path` has forward slashes. It is the path within the repository, else the name of the file.
+    `portable_path` has forward slashes. It is the path within the repository, or else the name of the file.
     """
 
     file: str
@@ -115,7 +115,8 @@ def _locate(file: str, style: Style) -> _FileLocation:
     """Find the location of a file, and whether a Git work tree contains it.
 
     Links are resolved. If the target is outside every work tree, for example in the store of git-annex in `.git`, the
-    link itself is located. A link without an existing target, such as the link of a pipe, is not resolved.
+    link itself is located. A link whose target does not exist, such as the link to a pipe in `/proc`, is not
+    resolved.
     """
     if file == "-":
         return _FileLocation(_STANDARD_INPUT, _STANDARD_INPUT)
@@ -134,9 +135,9 @@ def _locate(file: str, style: Style) -> _FileLocation:
 
 
 def _work_tree(folder: str, style: Style) -> str:
-    """Nearest folder, from `folder` upwards, that contains `.git` or is the checkout of GitHub; empty if not found.
+    """Nearest folder, from `folder` upwards, that contains `.git` or is the checkout of a GitHub workflow.
 
-    In worktrees and submodules `.git` is a file.
+    Empty if there is no such folder. In worktrees and submodules `.git` is a file.
     """
     while not (os.path.lexists(os.path.join(folder, ".git")) or (style.is_checkout and folder == style.root)):
         above = os.path.dirname(folder)
@@ -153,7 +154,7 @@ def _below(file: str, folder: str) -> str:
 
 
 def _alike(names: Mapping[str, str]) -> list[str]:
-    """Files that share their name in `names` with another file."""
+    """Return the files that have the same name in `names` as another file. The keys of `names` are files."""
     uses = Counter(names.values())
     return [file for file, name in names.items() if uses[name] > 1]
 
@@ -171,14 +172,14 @@ def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
 
 
 def _with_folders(file: str, path: str, count: int) -> str:
-    """Path of a file with `count` more parent folders than `path`."""
+    """Path of a file that contains `count` more parent folders than `path`."""
     full_path = file.replace(os.sep, "/")
     folders, length = full_path.strip("/").split("/"), path.count("/") + 1 + count
     return "/".join(folders[-length:]) if length <= len(folders) else full_path
 
 
 def _own_ids(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Yield the id of each row and requirement that has requirement ids in the project.
+    """Yield the id of each row and requirement to which the project assigns requirement ids.
 
     Each id is paired with the first of these requirement ids.
     """
@@ -191,7 +192,11 @@ def _own_ids(mission: MissionFindings) -> Iterator[tuple[str, str]]:
 def _shared_requirements(
     missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
-    """Pairs of requirement id and row id that occur in several files, or whose requirement id is a mission name."""
+    """Return the pairs of requirement id and row id that are unique only together with the mission name.
+
+    A pair is not unique by itself if it occurs in several files, or if its requirement id equals the name of a
+    mission.
+    """
     used = {
         (own_id, subject, file)
         for mission, file in zip(missions, files, strict=True)

@@ -1,7 +1,7 @@
 """Write keys of the mission file and ids of rows in words, for drawings.
 
-The names of keys are already words, and the path of a key names the owner: `platforms.receiver.azimuth` is the
-azimuth of the receiver. The words are therefore made from the path, and no table has to list every key.
+Keys already consist of words, and the path of a key contains its owner: `platforms.receiver.azimuth` is the azimuth
+of the receiver. The words are therefore derived from the path, and no table of all keys is needed.
 """
 
 from bisar_budget.error_kinds.path_kinds import STATE_KINDS
@@ -34,5 +34,5 @@ def in_words(path: str) -> str:
 
 
 def key_beside(path: str) -> str:
-    """A key or an id to be written in small beside its words; empty if it consists of the same words."""
+    """Return a key or an id to be written in small print beside its words; empty if the words are the same."""
     return "" if in_words(path) == path else path

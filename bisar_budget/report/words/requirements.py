@@ -28,8 +28,9 @@ class RequirementLine(NamedTuple):
     """One line of the table of requirements, as strings.
 
     `decided_by` is the deciding row, or the reason why the requirement could not be judged. `remark` names the share
-    of the requirement to which the utilization `use` refers, with the reached and allowed values of the share. It
-    also gives the autofocus gain and the waivers. `texts` are the texts of the requirement ids.
+    of the requirement to which the utilization `use` refers, such as the share of a platform, and gives the reached
+    and the allowed value of this share. It also gives the autofocus gain and the waivers. `texts` are the texts of
+    the requirement ids.
     """
 
     requirement: JudgedRequirement
@@ -49,7 +50,7 @@ def requirement_id(requirement: JudgedRequirement) -> str:
 
 
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
-    """Yield the lines of the table of requirements, in the order of the JSON document."""
+    """Yield the lines of the table of requirements, in the same order as in the JSON document."""
     for requirement in mission.requirements:
         is_open = requirement.is_unjudged
         remark = ", ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)])
@@ -68,9 +69,10 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 
 def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
-    """Yield remarks for a requirement whose utilization differs from the ratio of reached to allowed value.
+    """Yield remarks that explain the utilization of a requirement.
 
-    They name the row with the largest utilization, the deciding share, and the autofocus gain.
+    There are remarks if the utilization differs from the ratio of the reached to the allowed value. They name the row
+    with the largest utilization, the deciding share, and the autofocus gain.
     """
     if requirement.is_unjudged or requirement.value is None:
         return
@@ -89,7 +91,7 @@ _SHARE_NAMES = {"autofocus": "autofocus pull-in", "scene": "at the scene's edge"
 
 
 def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
-    """Text about the deciding share and its values, such as `receiver's share: 24.4 of 31.5 deg`."""
+    """Text about the share that decides a requirement, such as `receiver's share: 24.4 of 31.5 deg`."""
     reached, allowed = requirement_size(share.reached, requirement), requirement_limit(share.allowed, requirement)
     number, _, unit = reached.rpartition(" ")
     if number and allowed.endswith(f" {unit}"):  # the unit is written once
@@ -98,9 +100,10 @@ def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
 
 
 def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | None]:
-    """Deciding share of a requirement and its autofocus gain, by name of the output column.
+    """Values of the output columns about the share that decides a requirement, and about autofocus, by column name.
 
-    The share has three columns: owner, allowed value and reached value. They are None if no share decides.
+    Three columns describe the share: its owner, its allowed value and its reached value. They are None if no share
+    decides the requirement. The last column is the autofocus gain of the requirement.
     """
     share = requirement.share
     return {
@@ -112,9 +115,9 @@ def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | Non
 
 
 def confidence_words(mission: MissionFindings) -> str:
-    """Text with the confidence at which a mission meets its requirements, beginning with a space.
+    """Text with the confidence at which a mission meets its requirements. It begins with a space.
 
-    It is empty if a requirement is not met.
+    The text is empty if a requirement is not met.
     """
     status = STATUS[mission.status]
     return f" {mission.confidence}" if status.is_held and not status.fails else ""
@@ -124,7 +127,10 @@ _HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error
 
 
 def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Sentence with the status, values and remarks of a requirement, and with the confidence if it is met."""
+    """Sentence with the status, values and remarks of a requirement.
+
+    If the requirement is met, the sentence also states the confidence.
+    """
     text = f"{requirement.name}{own_id(requirement)}"
     if requirement.value is not None:
         limit = requirement_limit(requirement.value, requirement)
@@ -142,10 +148,10 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    """Sentence about the whole mission.
+    """Sentence with the verdict on a whole mission.
 
-    It states that all requirements are met, or how many are broken or cannot be judged. If `is_brief` is true, it
-    leaves out verbs such as "is".
+    It states that all requirements are met, or how many are broken or cannot be judged. If `is_brief` is true, verbs
+    such as "is" are left out.
     """
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
@@ -178,10 +184,10 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 
 def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
-    """Text with the number of waived requirements and the ids of the waivers, as a list.
+    """Return a list with a text about waivers, or an empty list if nothing is waived.
 
-    If no requirement is waived, waived rows are counted instead. The list has a single item, and is empty if nothing
-    is waived.
+    The text gives the number of waived requirements and the ids of the waivers. If no requirement is waived, it gives
+    the number of waived rows instead.
     """
     counts = [sum(item.status == "waived" for item in judged) for judged in (mission.requirements, mission.rows)]
     count, noun = (counts[0], "requirement") if counts[0] else (counts[1], "row")
@@ -194,7 +200,7 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
-    """Verdict on a mission that breaks no requirement. It mentions waivers, warnings or autofocus."""
+    """Verdict on a mission that breaks no requirement. Waivers, warnings or autofocus are mentioned."""
     text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
@@ -204,7 +210,8 @@ def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
 class UnjudgedEffect(NamedTuple):
     """An effect of errors that is not limited by any requirement.
 
-    `text` names the effect and the line to add to the mission file. `rows` are the rows with the effect.
+    `text` names the effect, and the line that would have to be added to the mission file to limit it. `rows` are the
+    rows of the errors that have this effect.
     """
 
     text: str
@@ -230,14 +237,14 @@ def _texts(values: object) -> list[str]:
 
 
 def is_explained_in_table(row: Row) -> bool:
-    """Whether the lines below the table of requirements explain why a row is not evaluated."""
+    """Whether the lines below the table of requirements already explain why a row is not evaluated."""
     return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
-    """Broken or waived requirements that are not visible in the rows.
+    """Return the broken or waived requirements that are not visible in the rows.
 
-    Such a requirement has no row with the same status.
+    No row of such a requirement has the same status as the requirement.
     """
     statuses = {row.id: row.status for row in mission.rows}
     return [
@@ -249,9 +256,9 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
 
 
 def shown_ids(row: Row, mission: MissionFindings) -> list[str]:
-    """Requirement ids of the broken or waived requirements that a row represents, because it has the same status.
+    """Project ids of the broken or waived requirements that a row represents because it has the same status.
 
-    Formats that list only findings do not list these requirements separately (see `unseen`).
+    Formats that list only findings do not list these requirements separately; see `unseen`.
     """
     ids = [
         own_id
@@ -265,9 +272,10 @@ def shown_ids(row: Row, mission: MissionFindings) -> list[str]:
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Sentence with the number of declared kinds of error.
+    """Sentence with the number of kinds of error that are declared.
 
-    It also gives the kinds that are missing, off their data sheet, or without a source.
+    It also names the kinds that are missing, the kinds without a source, and the kinds whose data-sheet spectra the
+    file shifts by a number of decibels.
     """
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
@@ -280,9 +288,9 @@ def declared_words(kinds: DeclaredKinds) -> str:
 
 
 def shifted_names(kinds: DeclaredKinds) -> list[str]:
-    """Texts for the kinds of error whose values are shifted off the data sheet by a stated level.
+    """Texts for the kinds of error whose data-sheet spectra the file shifts by a number of decibels.
 
-    Each text names the kind and its level.
+    Each text names the kind and the shift.
     """
     return [f"{''.join(kind_names([error.kind]))} {error.level}" for error in kinds.shifted]
 
@@ -304,10 +312,10 @@ _NAME_WIDTH = 33  # characters
 
 
 def probabilities(drawn: MonteCarlo) -> list[str]:
-    """Make the lines of the table of the Monte Carlo result, with warnings and notes.
+    """Return the lines of the table of Monte Carlo results, followed by warnings and notes.
 
-    The table has the probability that each requirement is met. For comparison, it also has sums that do not need
-    random draws.
+    The table contains the probability that each requirement is met. For comparison, it also contains combined errors
+    that are computed without random draws.
     """
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
@@ -329,7 +337,7 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
 
 
 def _is_not_drawn(note: Note) -> bool:
-    """Whether a note names errors that are not drawn. Such notes are written above the table."""
+    """Whether a note names errors that are left out of the random draws. Such notes are written above the table."""
     return note.code in ("vibration-is-not-drawn", "stated-power-is-not-drawn")
 
 
@@ -365,6 +373,6 @@ def _decimals(low: float, high: float) -> int:
 
 
 def _percent(probability: float, decimals: int) -> str:
-    """Write a probability in percent with `decimals` decimals; 0 % and 100 % have none."""
+    """Write a probability in percent with `decimals` decimals. 0 % and 100 % are written without decimals."""
     text = f"{100 * probability:.{decimals}f}"
     return f"{float(text):.0f} %" if float(text) in (0.0, 100.0) else f"{text} %"

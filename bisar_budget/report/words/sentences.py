@@ -1,4 +1,4 @@
-"""Texts that all report formats use: utilizations, causes, sizes in units of the file, tables, escaped text."""
+"""Texts that all report formats use: utilizations, causes, values in the units of the file, tables, escaped text."""
 
 import math
 import os
@@ -22,9 +22,9 @@ BINDING_WORDS = {
 
 
 def matters(row: Row) -> bool:
-    """Whether a row is worth showing, because it is declared or limits something.
+    """Whether a row is worth showing: its error is declared, or it has a limit that is checked.
 
-    A passing row along axes that differ from the axes of the file is not worth showing.
+    A passing row is not worth showing if its axes differ from the axes used in the mission file.
     """
     if row.status in ("info", "pass"):
         is_declared = (
@@ -37,13 +37,16 @@ def matters(row: Row) -> bool:
 def binding_words(row: Row) -> str:
     """Name of the requirement that sets the allowable of a row.
 
-    It is empty if this requirement is on the metric of the row itself.
+    The name is empty if this requirement limits the metric of the row itself.
     """
     return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
 
 
 def percent(ratio: float) -> str:
-    """Write a ratio in percent. Near 100 %, it has enough digits to show whether it is above or below 100 %."""
+    """Write a ratio in percent.
+
+    Near 100 %, enough digits are written to show whether the ratio is above or below 100 %.
+    """
     value = 100 * ratio
     if value == 0:
         return "0 %"
@@ -65,17 +68,17 @@ def percent(ratio: float) -> str:
 
 
 def share_percent(fraction: float) -> str:
-    """Write a fraction in percent with three digits. Unlike `percent`, it has no extra digits near 100 %."""
+    """Write a fraction in percent with three digits. In contrast to `percent`, no digits are added near 100 %."""
     return "<0.01 %" if 0 < fraction < 1e-4 else f"{100 * fraction:.3g} %"
 
 
 def use_words(use: float | None) -> str:
-    """Write a utilization in percent; a dash for None."""
+    """Write a utilization in percent. None is written as a hyphen."""
     return "-" if use is None else percent(use)
 
 
 def own_id(judged: Row | JudgedRequirement) -> str:
-    """Requirement ids of a row or a requirement, in brackets after a space; empty if the file gives it no id."""
+    """Requirement ids of a row or a requirement, in brackets and with a leading space; empty if there are no ids."""
     return f" [{judged.requirement_id}]" if judged.requirement_ids else ""
 
 
@@ -104,13 +107,13 @@ def cause(row: Row) -> str:
 
 
 def finding(row: Row, mission: MissionFindings) -> str:
-    """Sentence about a row: its id, its requirement id, and the texts of `measure` and `cause`."""
+    """Sentence about a row: its id, its requirement id, and the texts that `measure` and `cause` return for it."""
     reason = cause(row)
     return f"{row.id}{own_id(row)}: {measure(row, mission)}{f'. {sentence(reason)}' if reason else ''}"
 
 
 def counted(count: int, noun: str) -> str:
-    """Write a count with its noun, such as `1 fault` or `2 faults`."""
+    """Write a count and its noun, such as `1 fault` or `2 faults`."""
     return f"{count} {noun}{'s' if count != 1 else ''}"
 
 
@@ -118,7 +121,10 @@ _LISTED_COUNT = 3  # waivers whose ids a sentence lists
 
 
 def waiver_names(ids: Sequence[str]) -> str:
-    """Text such as `waiver receiver.*` with up to three waiver ids as in the file, and the number of further ids."""
+    """Text that names waivers, such as `waiver receiver.*`.
+
+    It contains up to three waiver ids, spelled as in the file, and the number of further waivers.
+    """
     return f"waiver{'s' if len(ids) > 1 else ''} {_listed_ids(ids)}"
 
 
@@ -133,18 +139,21 @@ def _listed_ids(ids: Sequence[str]) -> str:
 
 
 def dotted(path: KeyPath) -> str:
-    """Write a path of keys in the syntax of `--set`."""
+    """Write the path of a key in the syntax of the option `--set`."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).lstrip(".")
 
 
 def sentence(text: str) -> str:
-    """Capitalize the first letter of a text, unless the text begins with the name of a row or file."""
+    """Capitalize the first letter of a sentence, unless the sentence begins with a row id or a file name."""
     first = text.partition(" ")[0].rstrip(",:;")
     return text[:1].upper() + text[1:] if first.replace("-", "").isalpha() else text
 
 
 def dashed(text: str) -> str:
-    """Replace a text by an en dash if it is only a hyphen. An en dash marks a missing value on pages."""
+    """Return an en dash if the text is a hyphen, and the unchanged text otherwise.
+
+    In pages, an en dash marks a missing value.
+    """
     return "–" if text == "-" else text
 
 
@@ -154,15 +163,16 @@ _LEVEL_REQUIREMENTS = ("pslr", "islr")  # requirements in dB of the image
 
 
 def is_noise_level(row: Row) -> bool:
-    """Whether the numbers of a row are levels of a noise spectrum in dB, relative to the declared spectrum."""
+    """Whether the values of a row are levels of a noise spectrum in dB relative to the declared spectrum."""
     return row.unit == "dB" and row.subject.axis == row.subject.facts.spectrum_axis
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
-    """Write a number of a row in the unit that the file uses for this row; a dash for None.
+    """Write a value of a row in the unit that the file uses for this row. None is written as a hyphen.
 
-    A sum of phases has the unit of its requirement. If the file has no unit, the number gets an SI prefix that makes
-    it readable. Levels relative to the declared noise have a sign; 0 dB is written as `as declared`.
+    A value that is a sum of phases has the unit of its requirement. If the file gives no unit, an SI prefix that
+    makes the value readable is chosen. Levels relative to the declared noise are written with a sign; 0 dB is written
+    as `as declared`.
     """
     if value is None:
         return "-"
@@ -178,7 +188,7 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row, rounded down, so that the row passes if the value is copied into a file.
+    """Write the allowable of a row. It is rounded down, so that the row passes if the text is copied into a file.
 
     Image levels (rows of PSLR and ISLR) are rounded to nearest, because they are never copied into a file.
     """
@@ -186,10 +196,10 @@ def row_limit(row: Row, mission: MissionFindings) -> str:
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row.
+    """Write the allowable of a row, or a placeholder for a row without an allowable.
 
-    If there is no allowable, a row that is not judged gets a dash, as do rows for PSLR, ISLR and required
-    declarations. All further rows get `no limit`.
+    The placeholder is a hyphen for a row that is not judged, and for rows of PSLR, ISLR and required declarations.
+    For all other rows it is `no limit`.
     """
     if row.allowable is not None:
         return row_limit(row, mission)
@@ -198,31 +208,34 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 
 def shown_use(row: Row) -> float | None:
-    """Utilization of a row to show; None if the row has no limit, or if it cannot be judged, even if waived."""
+    """Utilization of a row for display.
+
+    None if the row has no limit, or if it cannot be judged; a waiver does not change this.
+    """
     return None if row.allowable is None or row.is_unjudged else row.utilization
 
 
 def phase_unit(mission: MissionFindings) -> str:
-    """Unit of the quadratic phase requirement in the file; degrees if the file states none."""
+    """Unit in which the file states the quadratic phase requirement; degrees if the file does not state it."""
     lines = (requirement.line for requirement in mission.requirements if requirement.key == "quadratic_phase_error")
     return _file_unit(next(lines, None), "rad") or _PHASE_UNIT
 
 
 def phase_limit(value: float, mission: MissionFindings) -> str:
-    """Write an allowed phase [rad], rounded down, in the unit of the quadratic phase requirement."""
+    """Write an allowed phase [rad] in the unit of the quadratic phase requirement, rounded down."""
     return format_in(value, "rad", phase_unit(mission), 3, "down")
 
 
 def requirement_limit(value: float | None, requirement: JudgedRequirement) -> str:
-    """Write the limit of a requirement or of a share.
+    """Write the limit of a requirement, or of a share of it.
 
-    Levels in dB are rounded to nearest, all further limits are rounded down.
+    Levels in dB are rounded to nearest; all further limits are rounded down.
     """
     return requirement_size(value, requirement, "nearest" if requirement.key in _LEVEL_REQUIREMENTS else "down")
 
 
 def requirement_size(value: float | None, requirement: JudgedRequirement, rounding: str = "nearest") -> str:
-    """Write a value of a requirement in the unit that the file uses for it; a dash for None."""
+    """Write a value of a requirement in the unit that the file uses for it. None is written as a hyphen."""
     if value is None:
         return "-"
     unit = _file_unit(requirement.line, requirement.unit) or (_PHASE_UNIT if requirement.unit == "rad" else "")
@@ -233,7 +246,7 @@ _LEAST_LEVEL_DB = 5e-4  # the level of an echo as strong as its point differs fr
 
 
 def _level(value: float, unit: str) -> float:
-    """Replace a level in dB by 0 if it differs from 0 dB only by rounding; any other value is returned unchanged."""
+    """Replace a level in dB by 0 if it differs from 0 dB only by rounding. Any other value is returned unchanged."""
     return 0.0 if unit == "dB" and abs(value) < _LEAST_LEVEL_DB else value
 
 
@@ -245,7 +258,7 @@ TEXT_WIDTH = 80
 
 
 def wrapped(text: str, indent: str) -> list[str]:
-    """Wrap text at spaces to 80 columns. Longer words are not broken, so that paths can be copied."""
+    """Wrap text at spaces to 80 columns. Words that do not fit are not broken, so that paths can be copied."""
     lines = []
     while len(text) > TEXT_WIDTH:
         margin = len(text) - len(text.lstrip(" "))
@@ -260,7 +273,7 @@ def wrapped(text: str, indent: str) -> list[str]:
 
 
 def wrapped_counts(text: str) -> list[str]:
-    """Wrap a line such as `file: 1 FAIL, 2 pass` at 80 columns, after a colon, comma or semicolon."""
+    """Wrap a line such as `file: 1 FAIL, 2 pass` to 80 columns. Lines end only after a colon, comma or semicolon."""
     joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
     first, *continuation = (line.replace("\u00a0", " ") for line in wrapped(joined, "  "))
     return [
@@ -270,19 +283,23 @@ def wrapped_counts(text: str) -> list[str]:
 
 
 def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
-    """Write cells as one line of columns. `sides` has `<` or `>` for each column, to align it left or right."""
+    """Write cells as one line of columns.
+
+    `sides` has a character for each column: `<` aligns it left, and `>` aligns it right.
+    """
     return " ".join(f"{cell:{side}{width}}" for cell, width, side in zip(cells, widths, sides, strict=True))
 
 
 def table(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> list[str]:
-    """Write rows of cells, the header first, as lines of an aligned table at most `width` characters wide."""
+    """Write rows of cells as an aligned table at most `width` characters wide. The first row is the header."""
     return [line for lines in aligned(rows, width) for line in lines]
 
 
 def aligned(rows: Sequence[Sequence[str]], width: int = TEXT_WIDTH) -> Iterator[list[str]]:
-    """Yield the lines of each row of a table. Names and the last column are aligned left, numbers right.
+    """Yield the lines of each row of a table.
 
-    A name that would make its line longer than `width` characters is written on a line above its numbers.
+    The first and the last column are aligned left, all further columns right. A name that would make its line longer
+    than `width` characters is written on a line above its values.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = width - sum(widths[1:]) - len(widths) + 1
@@ -314,7 +331,7 @@ def xml_text(text: str) -> str:
 
 
 def _markdown_escape(match: re.Match[str]) -> str:
-    """Escape a special character with a backslash, which is easy to read, or with a character reference."""
+    """Escape the matched special character with a backslash, which is easy to read, or with a character reference."""
     special = match[0]
     return f"\\{special}" if special in r"\*_[]~" else f"&#{ord(special)};"
 
@@ -326,7 +343,7 @@ def markdown_text(text: str) -> str:
 
 
 def markdown_row(cells: Iterable[str]) -> str:
-    """Write the cells as a line of a Markdown table."""
+    """Write cells as a line of a Markdown table."""
     return f"| {' | '.join(cells)} |"
 
 
@@ -338,26 +355,26 @@ def command_text(text: str) -> str:
 def command_property(text: str) -> str:
     """Escape a property of a GitHub workflow command.
 
-    Colons and commas are also escaped, because they would end the property.
+    Colons and commas are also escaped, because they would end the property; in a message they are not escaped.
     """
     return command_text(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def rst_text(text: str) -> str:
-    """Escape all punctuation for one line of reStructuredText."""
+    """Escape all punctuation in a line of text for reStructuredText."""
     return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", printable(text))
 
 
 def need_text(text: str) -> str:
-    """Escape a field for Sphinx-Needs.
+    """Escape the text of a field for Sphinx-Needs.
 
-    Sphinx-Needs would otherwise run `[[function()]]` and look up `<<variant>>`.
+    Otherwise Sphinx-Needs would run `[[function()]]` and look up `<<variant>>`.
     """
     return printable(text).replace("[[", "[ [").replace("<<", "< <")
 
 
 def uri(path: str) -> str:
-    """Percent-encode a path with forward slashes. An absolute path becomes a `file` URI."""
+    """Percent-encode a path that has forward slashes. An absolute path becomes a `file` URI."""
     from urllib.parse import quote  # takes 2 ms to load; a check to a terminal does not need it
 
     encoded = quote(os.fsencode(path), safe="/")
@@ -374,7 +391,7 @@ _SIZE_PATTERN = re.compile(
 def spreadsheet_text(value: str | None) -> str | None:
     """Put an apostrophe before text that a spreadsheet would run as a formula.
 
-    Text that starts with blanks is checked as well.
+    This includes formulas that follow leading blanks.
     """
     value = printable(value) if value else value
     is_formula = (
