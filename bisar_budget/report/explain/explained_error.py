@@ -30,9 +30,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     They show the stated value, its frame and the coverage factor.
     """
     yield from stated(mission, source.path, source.declared, source.evidence)
-    if source.declared is None:
-        return
-    if not source.is_covered:
+    if source.declared is None or not source.is_covered:
         return
     if not source.is_independent:
         yield from _rotated_declaration(mission, source, source.subject.axis)
