@@ -196,7 +196,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """Description of the problem without its location, the given value and the accepted values."""
+        """Description of the problem only; location, given value and accepted values are not included."""
         return self.problem
 
     def __str__(self) -> str:

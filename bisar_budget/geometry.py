@@ -183,7 +183,7 @@ class Fall(Protocol):
     def rate_against_stars(self, position: Vectors) -> Vectors:
         """Velocity error in the axes of the scene due to a position error that is constant in inertial space. [m/s]
 
-        `position` is the position error, east, north and up. [m]
+        `position` [m] is the position error, east, north and up.
         """
 
     def orbit_rate(self, path: "PlatformState") -> Vectors:

@@ -199,9 +199,10 @@ class GroundMatrix:
 
     @property
     def place_weights(self) -> tuple[Floats, Floats]:
-        """Displacement of the image point per metre of range error at each node: −H⁻¹⟨g, ·⟩. [m/m]
+        """Displacement of the image point per metre of range error at each node. [m/m]
 
-        Returns the displacements east and north, (nodes, cases) each.
+        It is −H⁻¹⟨g, ·⟩, with the matrix H and the range gradient g of the module docstring. Returns the
+        displacements east and north, (nodes, cases) each.
         """
         (x, y), determinant = self.projection, self.determinant
         with np.errstate(all="ignore"):

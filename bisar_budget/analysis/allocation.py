@@ -183,8 +183,9 @@ ROOM = {"pga": 3.0, "map_drift": 1.5}  # smallest size of the patch, in units of
 class Caps(NamedTuple):
     """Upper bounds on a useful N_pull: `walk`, set by range walk, and `scene`, set by the size of the scene.
 
-    `walk` is f₀/B. A larger N_pull is reduced to `walk`. `scene` is None if the mission file gives no size of the
-    scene. If N_pull exceeds `scene`, the report contains a warning.
+    N_pull is the pull-in range of autofocus in units of π rad. `walk` is f₀/B, the ratio of centre frequency to
+    bandwidth. A larger N_pull is reduced to `walk`. `scene` is None if the mission file gives no size of the scene.
+    If N_pull exceeds `scene`, the report contains a warning.
 
     A phase of π·N at the aperture edge corresponds to a range walk of λN/2, which is N·B/2f₀ range cells. Such a
     phase smears a point target over 4N cross-range cells. The bounds were measured on images of point targets
@@ -203,7 +204,7 @@ class Caps(NamedTuple):
 
 
 def caps(mission: Mission) -> Caps:
-    """Return the upper bounds on the N_pull of a mission's autofocus, see `Caps`."""
+    """Return the upper bounds on N_pull, the pull-in range of a mission's autofocus in units of π rad, see `Caps`."""
     walk = range_walk_cap(mission)
     if mission.scene.radius is None:
         return Caps(walk)
@@ -212,14 +213,17 @@ def caps(mission: Mission) -> Caps:
 
 
 def range_walk_cap(mission: Mission) -> float:
-    """Upper bound f₀/B that range walk sets on N_pull, as a number or as an array (cases,)."""
+    """Upper bound that range walk sets on N_pull, the pull-in range of autofocus in units of π rad.
+
+    It is the ratio f₀/B of centre frequency to bandwidth, as a number or as an array (cases,).
+    """
     return mission.radar.center_frequency / mission.radar.bandwidth
 
 
 def effective_n_pull(mission: Mission) -> float | None:
     """N_pull that a mission's autofocus reaches: the value in the mission file, but at most `range_walk_cap`.
 
-    The result is None if the file declares no autofocus.
+    N_pull is the pull-in range in units of π rad. The result is None if the file declares no autofocus.
     """
     stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
     if stated is None:
@@ -230,7 +234,8 @@ def effective_n_pull(mission: Mission) -> float | None:
 def needed_sentence(n_pull: float, caps: Caps) -> Note:
     """Write a note with the N_pull that an error needs to pass.
 
-    If this N_pull exceeds one of the upper bounds, the note gives the bound as well.
+    N_pull is the pull-in range of autofocus in units of π rad. If the needed N_pull exceeds one of the upper bounds,
+    the note gives the bound as well.
 
     Parameters
     ----------

@@ -71,8 +71,8 @@ class Analysis:
         Rows of the report whose allowable is needed even if the file declares no error for them. The keys are the ids
         of the rows. If omitted, all rows are included.
     is_complete : bool
-        Compute all numbers of each row, not only those that decide the result. The results of a case then do not
-        depend on how many cases are analysed together.
+        Compute all numbers of each row, not only the numbers that decide the result. The results of a case then do
+        not depend on how many cases are analysed together.
     is_of_sums : bool
         Judge only the combined errors, and omit the allowables of the single errors. Ignored under the rule `each`.
 
@@ -100,8 +100,8 @@ class Analysis:
         Names of the gating models, which are the models whose verdicts count. The list contains both models if the
         stricter verdict decides, otherwise a single name.
     published, full : Model
-        Effects of the errors in each model. The published model follows Tables I and II and equation (25) of the
-        paper, and does not include the direct path. The full model follows from exact ranges.
+        Effects of the errors in each model. The published model follows Tables I and II and equation (25) of Rigling
+        & Moses, and does not include the direct path. The full model follows from exact ranges.
     allocation : Allocation
         Budgets of the cases, divided between transmitter, receiver and clock. The split `balanced` divides in
         proportion to the phases in the model whose verdict counts. If the verdicts of both models count, it uses the
@@ -232,7 +232,7 @@ class Case:
 
         Each component is given for the phase of the tone at which it is largest. `model` is `published` or `full`.
         The result is None if the row has no tone, or if the model gives no displacement, for example because the
-        matrix Q is singular.
+        matrix Q of equation (25) in Rigling & Moses is singular.
         """
         for tone in self.analysis.displacing_tones:
             if tone.subject.id == row_subject.id:

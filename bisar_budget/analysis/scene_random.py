@@ -20,7 +20,7 @@ underestimate this difference.
   to each other, so their effects add. A vibration stated along the line of sight moves the platform along the line of
   sight to the scene centre.
 
-An error that the mission file states only by its effect has this effect at every ground point.
+If the mission file states only the effect of an error, the error has this effect at every ground point.
 
 These relations are derived here. `tests/simulate/test_random_at_scene_edge.py` checks them against exact ranges.
 """

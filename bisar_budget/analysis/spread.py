@@ -97,8 +97,8 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
     ratio : float or array
         ISLR as a power ratio.
     model : str
-        `published` or `full`. With σ² as the variance of the phase, the ISLR is σ² in the published model, according
-        to the paper's rule, and (exp(σ²) - 1)/E in the full model, as in an image.
+        `published` or `full`. With σ² as the variance of the phase, the ISLR is σ² in the published model, by the
+        rule of Rigling & Moses, and (exp(σ²) - 1)/E in the full model, as in an image.
     energy : float
         Fraction E of the response's energy within the first nulls, see `mainlobe_energy`.
     """
@@ -108,7 +108,7 @@ def spread_phase(ratio: PerCase, model: str, energy: float) -> Any:
 def islr_db(variance: PerCase, model: str, energy: float) -> Any:
     """ISLR that noise with a given phase variance adds. [dB]
 
-    The variance σ² [rad²] must be above 0. In the published model the ISLR is σ², according to the paper's rule. In
+    The variance σ² [rad²] must be above 0. In the published model the ISLR is σ², by the rule of Rigling & Moses. In
     the full model it is (exp(σ²) - 1)/E, as in an image. `energy` is the fraction E, see `mainlobe_energy`.
     """
     if model == "published":
@@ -129,8 +129,9 @@ def islr_of(mission: Mission, variance: PerCase) -> Floats:
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
     """Largest rms noise phase with which an owner stays within its share of the required ISLR. [rad]
 
-    An owner is a platform, the clock or the mission. In the published model the limit follows from the paper's rule,
-    otherwise from the ISLR in an image. The result is None if the mission has no requirement on ISLR.
+    An owner is a platform, the clock or the mission. In the published model the limit follows from the rule of
+    Rigling & Moses, ISLR = σ². In the full model it follows from the ISLR in an image. The result is None if the
+    mission has no requirement on ISLR.
     """
     if mission.requirements.islr is None:
         return None
@@ -194,7 +195,7 @@ def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -
 def noise(
     mission: Mission, geometry: BistaticGeometry, random: Iterable[RandomError], model: str
 ) -> list[SpreadPhase]:
-    """List the phase errors due to noise, which spread energy over the image, with their variances. [rad²]
+    """List the phase errors that are due to noise and spread energy over the image, with their variances [rad²].
 
     They are due to wideband vibration, to the random errors `random`, and to errors whose ISLR contribution the
     mission file states. The random errors are sensor noise, phase noise and the noise of synchronization links.
@@ -221,7 +222,7 @@ def rests(
     slow: Iterable[DeclaredPhase],
     slow_tones: Mapping[str, SlowTone],
 ) -> list[SpreadPhase]:
-    """List, for each error, the part of its phase beyond the cubic order, with the variance of this part. [rad²]
+    """List, for each error, the part of its phase beyond the cubic order, with the variance of this part [rad²].
 
     The errors are errors of motion, clocks and sensors, and slow vibrations. The variances are at one sigma, without
     coverage factor. Negligible phases are left out. The phases are very small for short apertures, and larger for an

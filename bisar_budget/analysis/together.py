@@ -59,9 +59,9 @@ class Together:
         in `own`.
     undirected_moves : list of (str, (east, north))
         Displacements of the image [m] due to random errors and tones, which have no sign. Each item is a pair of row
-        id and displacement. For a random error, the displacement is given by its sigmas. For a tone, each component
-        is given for the phase of the tone at which it is largest. The displacement is 0 for a clock error if the
-        mission file does not determine the displacement.
+        id and displacement. For a random error, the components of the displacement are sigmas. For a tone, each
+        component is given for the phase of the tone at which it is largest. The displacement is 0 for a clock error
+        if the mission file does not determine the displacement.
     """
 
     def __init__(

@@ -38,12 +38,12 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 
 
 class TonePart(NamedTuple):
-    """Part of a tone with a single direction and a single frequency, and the displacement that this part causes.
+    """Sinusoidal motion at one frequency along one direction, as a part of a tone, and the displacement it causes.
 
-    Over the aperture, the part is expanded in Legendre polynomials of order 0 to 3. `orders` (4, n) [m] are the
-    signed amplitudes of these four terms; the amplitude of a term is its value at the aperture edge. `per_metre`
-    (4, 2, n) [m/m] is the displacement of the image, east and north, per metre of amplitude of each term. The last
-    axis holds n cases.
+    Over the aperture, the motion is expanded in Legendre polynomials of order 0 to 3. `orders` (4, n) [m] are the
+    signed amplitudes of these four terms; the amplitude of a term is its value at the aperture edge. `per_metre` (4,
+    2, n) [m/m] is the displacement of the image, east and north, per metre of amplitude of each term. The last axis
+    holds n cases.
     """
 
     orders: Floats
@@ -51,7 +51,7 @@ class TonePart(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """Displacement of the image east and north, each at the phase at which it is largest, (2, n). [m]"""
+        """Displacement of the image, each component (east, north) at its worst phase, (2, n). [m]"""
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
         return np.asarray(np.hypot(constant - quadratic, linear - cubic))
 
@@ -151,9 +151,10 @@ def _orders(cycles: PerCase, size: PerCase) -> Floats:
 
 
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
-    """Displacement of the image, east and north, per metre of each Legendre term, from equation (25). [m/m]
+    """Displacement of the image, east and north, per metre of each Legendre term, in the published model. [m/m]
 
-    The result is (4, 2, n). It is 0 for orders 2 and 3. For orders 0 and 1 it is NaN where the matrix Q is singular.
+    It follows from equation (25) of Rigling & Moses. The result is (4, 2, n). It is 0 for orders 2 and 3. For orders
+    0 and 1 it is NaN in each case in which the matrix Q of that equation is singular.
     """
     plane, _ = published_planes(geometry)
     displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))

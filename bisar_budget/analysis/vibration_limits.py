@@ -47,8 +47,8 @@ _motion_of_phase: Callable[..., PerCase] = evaluators.motion_of_phase
 class VibrationLimits(NamedTuple):
     """Largest allowed vibration of a platform along the line of sight, as an amplitude or an rms value. [m]
 
-    The limit `published` follows the paper's rule, and `full` is derived from first principles. Amplitudes are
-    measured from 0 to peak.
+    The limit `published` follows the rule of Rigling & Moses, and `full` is derived from first principles. Amplitudes
+    are measured from 0 to peak.
     """
 
     published: Any
@@ -64,7 +64,7 @@ class VibrationLimits(NamedTuple):
 
     @property
     def margin_db(self) -> Any:
-        """Ratio of the limit derived from first principles to the limit from the paper's rule. [dB]"""
+        """Ratio of the limit derived from first principles to the limit by the rule of Rigling & Moses. [dB]"""
         return 20 * np.log10(self.full / self.published)
 
 
@@ -261,8 +261,8 @@ def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> Slo
     """Largest allowed amplitudes of a vibration below one cycle per aperture. [m]
 
     The vibration is taken in its worst phase, see `effects.slow_tones`. The limit of the quadratic phase is the
-    platform's share of the budget, autofocus gain included. The limit of the cubic phase is the whole requirement
-    without autofocus gain, if the mission has such a requirement.
+    platform's share of the budget, autofocus gain included. The limit of the cubic phase is the mission's requirement
+    on it, if there is one; it is not divided between the platforms, and autofocus does not raise it.
     """
     gain, allowed = allocation.autofocus_gain, allocation.qpe_allowed(tone.subject.owner)
     required = mission.requirements.cubic_phase_error

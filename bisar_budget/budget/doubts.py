@@ -48,8 +48,8 @@ class InputDoubt:
     `doubt` is the possible error: the distance by which the true path may differ from the given path, or the error
     that the source of the path states. `declared` is the declared error without the coverage factor; it is 0 if the
     file declares no error. Both are given along the axis on which `doubt` exceeds `declared` most. If the possible
-    error has no direction, both are root-sum-squares over the axes. Their unit is the unit of `state`, the kind of
-    the error. `note` gives both values in words.
+    error has no direction, both are root-sum-squares over the axes. Their unit follows from `state`, the kind of the
+    error. `note` gives both values in words.
 
     If `is_of_log` is set, the doubt concerns the residual or the rounding of a log of position fixes. For a residual,
     which is the difference between the fixes and the smooth path, `doubt` is the phase that it causes, and `declared`

@@ -104,9 +104,9 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings about requirement ids without a row, and about requirement texts without a known id.
+    """Yield warnings about requirement ids without a row, and about wordings of requirements without a known id.
 
-    The ids and texts are stated in the mission file.
+    The ids and wordings are stated in the mission file.
     """
     if mission.requirement_ids:
         ids = [row.id for row in rows] + [id_of_requirement(key) for key in required_keys(mission)]

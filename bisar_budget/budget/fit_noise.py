@@ -29,9 +29,9 @@ _DECISIVE_EFFECT_FRACTION = (
 class AllowableNoise:
     """Allowable that is most affected by the noise of the log to which a platform's path is fitted.
 
-    `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
-    [m/s²]. `change` is one sigma of the relative change of the allowable. `row_id` is the id of the row with the
-    allowable.
+    `acceleration` [m/s²] is the standard deviation of the error of the path's acceleration, along the line of sight
+    at mid-aperture. `change` is the standard deviation of the relative change of the allowable. `row_id` is the id of
+    the row with the allowable.
     """
 
     acceleration: float
@@ -85,11 +85,11 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 
 
 def _changes(units: Floats) -> Floats:
-    """One sigma of the relative change of each allowable due to the error of a fitted path, (platforms, axes).
+    """Standard deviation of the relative change of each allowable due to the error of a fitted path.
 
-    `units` (platforms, axes, sides) holds the quadratic phase per unit of each error, computed for several paths. The
-    paths along the axis `sides` are the fitted path itself, then the path plus each mode of the fit error, then the
-    path minus each mode.
+    The result is (platforms, axes). `units` (platforms, axes, sides) holds the quadratic phase per unit of each
+    error, computed for several paths. The paths along the axis `sides` are the fitted path itself, then the path plus
+    each mode of the fit error, then the path minus each mode.
     """
     here = units[..., 0]
     with np.errstate(all="ignore"):

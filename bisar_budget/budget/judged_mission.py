@@ -220,7 +220,7 @@ def _families(
 
 
 def _rows(model: str, families: Sequence[FamilyRow], cases: int) -> dict[str, Judged]:
-    """Collect the rows of one model by their ids, and omit rows that do not exist in any case.
+    """Return the rows of one model by their ids; rows that do not exist in any case are omitted.
 
     Different families may contain the same row for different cases. These parts are merged into one row.
     """
@@ -320,7 +320,7 @@ def _floor(analysis: Analysis, doubts: Mapping[str, Booleans]) -> Codes:
 
 
 def _worst(codes: Codes, floor: Codes) -> Codes:
-    """Return the worst row status that counts in the verdict of a mission, (cases,).
+    """Return the worst row status that counts in the verdict on a mission, (cases,).
 
     `codes` (rows, cases) are the statuses of the rows. If `floor` (cases,) is worse, it is returned instead.
     """

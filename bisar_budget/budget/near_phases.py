@@ -85,7 +85,7 @@ class NearPhases(NamedTuple):
         doubt: PerCaseFlag = False,
         is_unknown: PerCaseFlag = False,
     ) -> Judged:
-        """Judge a tone by its echoes and by its phase errors.
+        """Judge both the echoes and the phase errors of a tone.
 
         `declared` is the declared size of the tone. `by_echoes` is the size at which its echoes reach the requirement
         on PSLR or ISLR; it is None if there is no such requirement. Where `is_unknown` is true, the level of the

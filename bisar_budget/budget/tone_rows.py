@@ -39,9 +39,9 @@ SENSITIVITY = "acceleration_sensitivity"
 def pslr_row(judging: Judging, tones: Sequence[Tone], required: PerCase) -> "PslrRow":
     """Judge the highest echo that all tones together can make, with the worst combination of their starting phases.
 
-    The row is derived from first principles in both models, because the paper's rule for the shares would be 3 dB
-    stricter. Tones that are at most 2.5 cycles per aperture apart raise each other's echoes, even if they come from
-    different sources.
+    The row is derived from first principles in both models, because the rule of Rigling & Moses for the shares would
+    be 3 dB stricter. Tones that are at most 2.5 cycles per aperture apart raise each other's echoes, even if they
+    come from different sources.
     """
     highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
     row_subject = subject("mission", "pslr")

@@ -7,9 +7,9 @@ constant and linear parts of the delay displace the image; parts of higher order
 The troposphere delays all frequencies by the same amount. Free electrons cause the group delay g = 40.3·TEC/f² [m],
 where TEC is the electron content along the leg [1/m²], and advance the phase at the centre frequency by the same
 amount. In the image, the constant part of the range error is therefore +ḡ, the mean of the group delay over the
-aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where g₁ is the linear part of
-g. The phases are those due to −g, plus the phases that the displacement adds. These relations are derived here, not
-taken from a publication.
+aperture. All other parts follow from the phase, −g. The displacement is Q⁻¹[ḡ, −g₁], where Q is the matrix of
+equation (19) of Rigling & Moses and g₁ is the linear part of g. The phases are the sum of the phases due to −g and
+the phases that the displacement adds. These relations are derived here, not taken from a publication.
 
 A delay with a correlation time changes within the aperture as a random process (`range_processes`). The published
 model computes the effects of the process for the line of sight at mid-aperture. In the full model the line of sight

@@ -65,9 +65,9 @@ class Declared(NamedTuple):
     order for the worse sign.
 
     `displacement` [m] is the displacement east and north for the declared sign of the error. `opposite` [m] is the
-    displacement for the opposite sign. For a pure phase error, and in the published model if Q has no inverse, both
-    are NaN; in plain numbers they are None. A displacement is also NaN if no ground point has the range history that
-    the error with this sign causes. The phases are then infinite.
+    displacement for the opposite sign. For a pure phase error, and in the published model if the matrix Q of equation
+    (25) in Rigling & Moses has no inverse, both are NaN; in plain numbers they are None. A displacement is also NaN
+    if no ground point has the range history that the error with this sign causes. The phases are then infinite.
 
     `hidden` [rad] is the hidden phase, which autofocus does not correct. A part of the range error remains for any
     displacement of the image, because of the finite bandwidth and the turn of the line of sight. The hidden phase is
@@ -150,7 +150,7 @@ class Allowed(NamedTuple):
 
 
 class ImagePlane(NamedTuple):
-    """Inverse of the matrix Q for each case, as adjugate and determinant.
+    """Inverse of the matrix Q of Rigling & Moses for each case, as adjugate and determinant.
 
     Q⁻¹ maps the constant [m] and the linear part [m/s] of a range error to the displacement of the image [m].
     `is_singular` marks the cases in which Q has no usable inverse.
@@ -180,13 +180,14 @@ _published_ground_inverse: Callable[..., tuple[tuple[PerCase, ...], ...]] = eval
 
 
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, PerCase]:
-    """Invert the matrix Q of the published model, given by equations (19) and (30).
+    """Invert the matrix Q of the published model, given by equations (19) and (30) of Rigling & Moses.
 
-    Returns the inverse, and the angle between the range and the Doppler gradient of Q. [deg]
+    Returns the inverse, and the angle [deg] between the range and the Doppler gradient of Q.
 
-    The published Q takes the slant ranges as constant: its second row is v/R, while the true second row is v⊥/R. Q
-    can therefore be singular where the true gradients are not parallel. Q contains only the look vectors at
-    mid-aperture. Where they almost cancel on the ground, Q has no usable inverse either.
+    The published Q takes the slant ranges R as constant: its second row is v/R, with the velocity v. The true second
+    row is v⊥/R, with the component v⊥ of v perpendicular to the line of sight. Q can therefore be singular where the
+    true gradients are not parallel. Q contains only the look vectors at mid-aperture. Where they almost cancel on the
+    ground, Q has no usable inverse either.
     """
     ground: list[PerCase] = []
     for path in geometry.both:
@@ -336,10 +337,10 @@ class ErrorBlock:
         sight. The second-order term of the range error, summed over both platforms, is −Σ|P⊥(r̃ − x̂)|²/2R. Its
         magnitude is at most |r̃ − x̂|²/R, where R is the range of the nearer platform.
 
-        With a direct path, the second-order term of the ranges is bounded separately for each platform, because for a
-        distant platform much of it cancels to first order. The second-order term of the distance D between the
-        platforms, |P⊥r̃|²/2D, has the opposite sign. The magnitude of the sum is therefore at most the magnitude of
-        the larger term.
+        With a direct path, much of the first-order range error of a distant platform cancels. The second-order term
+        of the ranges is therefore bounded separately for each platform, with the platform's own range. The
+        second-order term of the distance D between the platforms, |P⊥r̃|²/2D, has the opposite sign. The magnitude of
+        the sum is therefore at most the magnitude of the larger term.
         """
         exact, bent = self.exact, self._bent(size)
         shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
@@ -426,8 +427,8 @@ class ErrorBlock:
 
         `sizes` (n,) are the magnitudes of the errors.
 
-        Returns an array (2, rows, n). The first axis is the sign of the errors, positive first. The rows are those of
-        `point_paths.ROWS`. Values are NaN where no ground point has the range history that the error causes.
+        Returns an array (2, rows, n). The first axis is the sign of the errors, positive first. `point_paths.ROWS`
+        lists the rows. Values are NaN where no ground point has the range history that the error causes.
         """
         lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
@@ -960,7 +961,7 @@ class Model:
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement due to an error of signed size `size`, by exact ranges; None if no image forms."""
+        """Phases and displacement due to an error of signed size `size`, from exact ranges; None without an image."""
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True

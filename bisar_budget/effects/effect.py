@@ -82,7 +82,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of an error that is no motion
 
 
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
-    """Notes on the values of a part, such as a sensor, that the mission file overrides; one note for each value.
+    """Notes on values of a catalogue part that the mission file overrides, one note for each value.
 
     `figures` are the keys of the values to include. By default, all values in `overridden` are included.
     """
@@ -94,7 +94,7 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 
 def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
-    """Return the value in one case, given by its index, as a float.
+    """Return the value for the case with the given index, as a float.
 
     A single number, or an array with a single entry, holds for every case.
     """
@@ -278,8 +278,8 @@ PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they t
 class LinePiece(NamedTuple):
     """Piece of a range error over the aperture, approximated by a straight line.
 
-    `time` [s] is the centre τ_i of the piece, counted from mid-aperture. According to equations (27) and (28),
-    `value` [m] is the range error of the line at this time, and `slope` [m/s] is its rate.
+    `time` [s] is the centre τ_i of the piece, counted from mid-aperture. According to equations (27) and (28) of
+    Rigling & Moses, `value` [m] is the range error of the line at this time, and `slope` [m/s] is its rate.
     """
 
     time: float
@@ -288,14 +288,16 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name of the range and Doppler gradients in a model's matrix Q_i: as printed in the paper, or true gradients."""
+    """Name of the range and Doppler gradients in a model's matrix Q_i: as in Rigling & Moses, or true gradients."""
     return PRINTED if model == "published" else TRUE
 
 
 def indicated_point(
     geometry: BistaticGeometry, piece: LinePiece, model: str, seen_from: GroundVector = (0.0, 0.0)
 ) -> GroundVector:
-    """Ground point, relative to the scatterer, that a piece of range error indicates; from equation (29). [m]
+    """Ground point, relative to the scatterer, that a piece of range error indicates. [m]
+
+    It follows from equation (29) of Rigling & Moses.
 
     Parameters
     ----------
@@ -318,7 +320,7 @@ def indicated_point(
     Raises
     ------
     ZeroDivisionError
-        Range and Doppler gradients are parallel at τ_i.
+        Range and Doppler gradients are parallel at τ_i, the centre of the piece.
     """
     east, north = seen_from
     state_numbers, look, rate = [], [0.0, 0.0], [0.0, 0.0]

@@ -473,8 +473,8 @@ def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
     A Gauss–Markov process represents the residual of the fixes about the smooth path. It has the covariance and the
     correlation time of the residual. Independent fixes that are joined by straight lines are correlated over half an
-    interval. Like any noise, the process displaces and defocuses the image by its low Legendre orders, and spreads
-    power by its higher orders.
+    interval. As with any noise, the low Legendre orders of the process displace and defocus the image, and its higher
+    orders spread power.
 
     The fixes are rounded to a grid with the step q. The rounding error is uniformly distributed over a step and has
     the variance q²/12 along each coordinate. If the platform crosses many steps within the aperture, the rounding

@@ -40,7 +40,7 @@ _EXCHANGE_START_COUNT = 8  # start times of the exchanges, over which the effect
 
 
 class Felt(NamedTuple):
-    """Vibration that acts on an oscillator, and the oscillator's acceleration sensitivity. [s²/m]
+    """Vibration that acts on an oscillator, and the oscillator's acceleration sensitivity [s²/m].
 
     `is_own` tells whether the file states the vibration for the oscillator itself, and not for its platform.
     """
@@ -67,8 +67,8 @@ def felt(mission: Mission, name: str) -> Felt | None:
 def lacks_a_spectrum(mission: Mission, name: str) -> PerCaseFlag:
     """Mark the cases in which a wideband vibration without a spectrum affects the data through an oscillator.
 
-    The rms phase of the oscillator is f₀·Γ·4π²·f·σ for an rms displacement σ at the frequency f. It cannot be
-    computed, because f is unknown.
+    The rms phase of the oscillator is f₀·Γ·4π²·f·σ for an rms displacement σ at the frequency f, where Γ is the
+    acceleration sensitivity and f₀ the radar's centre frequency. It cannot be computed, because f is unknown.
     """
     felt_vibration = felt(mission, name)
     if (
@@ -191,7 +191,8 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     """Mean squares of the Legendre parts of the range error due to vibration, per squared unit of Γ. [m²/unit²]
 
-    They are sums over the vibration spectrum and the slow tones. Each tone is taken in its worst phase.
+    Γ is the acceleration sensitivity of the oscillator. The mean squares are sums over the vibration spectrum and the
+    slow tones. Each tone is taken in its worst phase.
     """
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # the transmitter's oscillator drops out
@@ -227,12 +228,12 @@ def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] 
 
 
 def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None = None) -> Floats:
-    """Time error per unit of Γ along each axis of the scene, v(τ) − v(0), (3, moments, …). [s/(s²/m)]
+    """Time error per unit of acceleration sensitivity along each axis of the scene, (3, moments, …). [s/(s²/m)]
 
-    `moments` [s] are slow times. If the clocks exchange pulses at an `interval` [s], the result is the remainder
-    after synchronization. The first exchange may be at any time within an interval, so the remainders for several
-    start times are returned, (3 · start times, moments, …). They are scaled so that the sum of their squares is the
-    mean square over the start times.
+    It is v(τ) − v(0), the change of the velocity v since mid-aperture. `moments` [s] are slow times. If the clocks
+    exchange pulses at an `interval` [s], the result is the remainder after synchronization. The first exchange may be
+    at any time within an interval, so the remainders for several start times are returned, (3 · start times, moments,
+    …). They are scaled so that the sum of their squares is the mean square over the start times.
     """
 
     def gained(tau: PerCase) -> Floats:
@@ -281,7 +282,7 @@ def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
-    """Phase spectrum of an oscillator under random vibration, per squared unit of Γ. [rad²/Hz/unit²]
+    """Phase spectrum of an oscillator under random vibration, per squared unit of sensitivity. [rad²/Hz/unit²]
 
     The result is empty if no vibration spectrum acts on the oscillator.
     """

@@ -263,8 +263,8 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: PerC
     """Effect of the noise that is assumed below the first point of a mask; None if the noise is negligible.
 
     The effect is computed with the full model and includes the coverage factor. `scale` is the square of the centre
-    frequency in Hz, multiplied by the level of the oscillator. The result is also None for an oscillator that is not
-    stated by a mask.
+    frequency in Hz, multiplied by the level of the oscillator. The result is also None for an oscillator whose noise
+    is not stated as a mask.
     """
     mask = oscillator.phase_noise
     if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
@@ -329,7 +329,7 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
-    """Mean squares of the parts of the oscillator phase that remains after synchronization, (parts, cases). [rad²]
+    """Mean squares of the Legendre components of the oscillator phase left by synchronization, (parts, cases). [rad²]
 
     They hold for a centre frequency of 1 Hz. For a centre frequency of f₀ Hz they are f₀² times as large. The parts
     are the Legendre parts in the fields of `Parts`. With `is_below_mask`, only the spectrum below the first point of
@@ -358,7 +358,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
 def _left_of(
     pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
-    """Mean squares of the parts of the phase that remains after synchronization, from a phase spectrum. [rad²]
+    """Mean squares of the Legendre components of the phase left by synchronization, from a phase spectrum. [rad²]
 
     `pieces` are the pieces of the spectrum. `interval` is the interval of exchanged pulses [s]; None if there are no
     exchanges. `cases_of_spectrum` are the indices of the cases to which the spectrum applies. Each field of the

@@ -1,9 +1,10 @@
 """Effects of random errors on the image, for one unit (1 sigma) of each error in each case.
 
-A random error has a sigma and no sign. Orders 0 and 1 of its range error displace the image according to Q⁻¹. Orders
-2 and higher defocus the image. The published model uses the line of sight at mid-aperture (`theory.random_errors`)
-and the matrix Q of equation (25). The full model includes the turn of the line of sight, a direct path from
-transmitter to receiver, and the phase that the displacement adds.
+A random error has a sigma and no sign. Its range error over the aperture is expanded in Legendre polynomials. Orders
+0 and 1 displace the image; orders 2 and higher defocus it. The published model uses the line of sight at mid-aperture
+(`theory.random_errors`) and computes the displacement with the inverse of the matrix Q, equation (25) of Rigling &
+Moses. The full model includes the turn of the line of sight, a direct path from transmitter to receiver, and the
+phase that the displacement adds.
 
 The numbers in a mission may be arrays (cases,). The geometry then has the same cases.
 """
@@ -285,7 +286,7 @@ class SensorCases:
 
     @cached_property
     def plane(self) -> ImagePlane:
-        """Matrix Q⁻¹ of the published model, which maps constant and linear range errors to displacements."""
+        """Matrix Q⁻¹ of Rigling & Moses, which maps constant and linear range errors to displacements."""
         return published_planes(self.geometry)[0]
 
     def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
@@ -374,7 +375,9 @@ class SensorCases:
         return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: PerCase, linear: PerCase, both: PerCase = 0.0) -> tuple[PerCase, PerCase]:
-        """Sigmas of the displacement east and north due to a random range error, by equation (25). [m]
+        """Sigmas of the displacement east and north due to a random range error, in the published model. [m]
+
+        They follow from equation (25) of Rigling & Moses.
 
         `constant` and `linear` [m²] are the mean squares of the constant and the linear part of the range error at
         the aperture edge. `both` [m²] is the mean product of the two parts. The sigmas are NaN where the matrix Q is

@@ -52,8 +52,8 @@ MAX_LANE_COUNT = 1 << 12  # pairs of case and value of ψ for which one call com
 class TonePhases:
     """Phase errors due to a vibration along each axis, for values of its phase ψ all around the circle.
 
-    Each field is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden
-    phase (see `Declared`), and rms phase beyond the cubic. [rad]
+    Each field is an array (axes, TONE_PHASE_COUNT, cases) of phases [rad]: quadratic and cubic phase at the aperture
+    edge, hidden phase (see `Declared`), and rms phase beyond the cubic.
     """
 
     quadratics: Floats
@@ -101,7 +101,7 @@ class SlowTone(NamedTuple):
 
     `per_metre` is the effect of a sinusoidal range error with an amplitude of 1 m. `declared` is the effect of the
     declared vibration. `is_there` (cases,) marks the cases in which the vibration has fewer than three cycles per
-    aperture. `hears_part` is true if only a part of the motion is range error, which is so for a vibration that the
+    aperture. `hears_part` is true if only a part of the motion is range error. This holds for a vibration that the
     file states along three axes, and for any vibration in a mission with a direct path.
     """
 

@@ -1,6 +1,6 @@
 """List of the signed errors that a mission can have, for one case or many. Random errors are in `random_errors`.
 
-A check lists all errors, including those that the file does not declare, because a designer wants to know their
+A check lists all errors, including the errors that the file does not declare, because a designer wants to know their
 allowable sizes. A sweep lists only the declared errors, and the errors whose rows are requested.
 """
 
@@ -136,7 +136,9 @@ class ErrorListing:
         ]
 
     def published_legs(self, platform_index: int, kind: StateKind) -> list[Effect]:
-        """Effects of a unit error of one platform along each of x, y and z in the published model (Tables I and II).
+        """Effects of a unit error of one platform along each of x, y and z in the published model.
+
+        They follow from Tables I and II of Rigling & Moses.
 
         `kind` is the kind of the error: position, velocity or acceleration.
         """
@@ -147,7 +149,7 @@ class ErrorListing:
         """Effects of a unit error of one platform along each of x, y and z in the full model.
 
         `kind` is the kind of the error: position, velocity or acceleration. The motion errors are the polynomials of
-        equation (22). For a platform in free fall, `_flown` gives the effects.
+        equation (22) in Rigling & Moses. For a platform in free fall, `_flown` gives the effects.
         """
         if (platform_index, kind.order) not in self._full_legs:
             along = np.stack([self.exact.along(platform_index, axis) for axis in _UNIT_VECTORS])
@@ -393,8 +395,8 @@ class ErrorListing:
 
         An error along an axis of the scene, such as a bias of one GNSS service, moves both measured paths by the same
         vector. An error along an axis of another frame moves each path along the axis of its own frame. The range
-        error is linear in the errors, and so are Table I and the full model. The common effect is therefore the sum
-        of the effects of both platforms, with their signs.
+        error is linear in the errors, and so are Table I of Rigling & Moses and the full model. The common effect is
+        therefore the sum of the effects of both platforms, with their signs.
         """
         error = self.mission.common_motion_error
         if error is None:

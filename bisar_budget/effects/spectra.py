@@ -146,9 +146,10 @@ _MAX_PANEL_COUNT = 4096  # panels in one integration
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
-    """Edges of the frequency panels for integrals over the parts of a tone, in ascending order. [Hz]
+    """Edges of the frequency panels for integrals that contain the Legendre components of a tone. [Hz]
 
-    `aperture_time` is in s. Within a panel the parts of a tone are smooth functions of frequency.
+    The edges are in ascending order. Within a panel, these components are smooth functions of frequency.
+    `aperture_time` is in s.
     """
     scale = math.pi * aperture_time
     edges = [_FIRST_POWER_ANGLE_RAD / scale * _OCTAVE_RATIO**n for n in range(4)]
@@ -311,11 +312,11 @@ def _fast(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted by a tone's squared Legendre components over n panels, (parts, n).
+    """Integrals of a spectrum x^(−slope), weighted by a tone's squared Legendre components, over panels, (parts, n).
 
     The integrals are computed by Gauss–Legendre quadrature. The angle x [rad] is πfT, where f is the frequency and T
-    the aperture time. `low` and `high` (n,) are the ends of the panels in x. The first axis has the components in the
-    order of `squares`.
+    the aperture time. `low` and `high` (n,) are the ends of the n panels in x. The first axis has the components in
+    the order of `squares`.
     """
     span = np.log(high / low)
     x = low * np.exp(span * _LEGENDRE_NODES)
@@ -480,7 +481,7 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: PerCase, 
 
 
 def link_parts(aperture_time: PerCase, interval: float) -> Parts:
-    """Mean squares of the Legendre components of a phase, interpolated linearly between independent samples.
+    """Mean squares of the Legendre components of a phase that is interpolated linearly between independent samples.
 
     `interval` [s] is the time T_s between the samples. The samples have variance 1. The one-sided spectrum of the
     phase is 2·T_s·sinc⁴(f·T_s). Its total power is ⅔.
@@ -598,10 +599,12 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
 def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
     """Mean spectrum of the images that are not computed one by one, as pieces of a power law f⁻⁴.
 
-    An image is the part of a spectrum that synchronization folds to another frequency. The mean is (2/T_s³)·∫
-    S·sin⁴(πfT_s) df/(πf)⁴. The images of a frequency lie x sampling rates away from the multiples of the rate.
-    According to the Euler–Maclaurin formula, a term has to be added to the mean: B₂(x) times the slope at the lower
-    end. Two pieces approximate this term; they begin half a sampling rate below and above the lower end.
+    An image is the part of a spectrum that synchronization folds to another frequency. The images of the frequency
+    x/T_s lie at the distance x/T_s from the multiples of the sampling rate 1/T_s. The mean replaces the sum over the
+    images by an integral. At the frequency f it is (2/T_s³)·∫ S(ν)·sin⁴(πνT_s) dν/(πf)⁴.
+
+    To this integral the Euler–Maclaurin formula adds a term with B₂(x) and the slope of f⁻⁴ at the lower end of the
+    integral. Two pieces approximate this term; they begin half a sampling rate below and above that end.
     """
     low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
     f = low + (high - low) * _LEGENDRE_NODES
@@ -638,9 +641,9 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Edges of the frequency panels for a synchronized phase, or for the change of a phase over an interval. [Hz]
 
-    `aperture_time` is in seconds. `rate` [Hz] is the inverse of the interval. Within a panel, the parts of a tone are
-    smooth functions of frequency, and so is the fraction of the tone that linear interpolation between samples
-    reproduces.
+    `aperture_time` is in seconds. `rate` [Hz] is the inverse of the interval. Within a panel, the Legendre components
+    of a tone are smooth functions of frequency, and so is the fraction of the tone that linear interpolation between
+    samples reproduces.
     """
     edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
     octave = _FOLLOWED_TURN_COUNT / aperture_time

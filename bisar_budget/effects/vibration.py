@@ -239,7 +239,7 @@ def seen_of_axes(
     """Range error per metre of a platform's vibration along each axis, as rms over the aperture. [m/m]
 
     The line of sight turns over the aperture. The rms is an upper bound for the height of every paired echo, and
-    gives the spread. If `is_vector` is true, the axes are those of the frame of the platform's motion error. If it is
+    gives the spread. If `is_vector` is true, the axes belong to the frame of the platform's motion error. If it is
     false, the file states a single value along the line of sight, and the result has a single item. Such a vibration
     is entirely range error; with a direct path, however, only a part of it is an error of the range minus the direct
     path.
@@ -461,11 +461,11 @@ def spectrum_parts(
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the random error of a vibration that the file states by a spectrum; yield nothing without a spectrum.
+    """Yield the random error of a vibration that the file specifies as a spectrum, or nothing if it does not.
 
-    `name` is the name of the vibrating platform. The size of the error is the factor by which the amplitude of the
-    vibration is multiplied; the declared size is 1. The unit is `dB`, because the row of the error has the factor in
-    decibels, as for the noise of an oscillator.
+    `name` is the name of the vibrating platform. The size of the error is a factor on the amplitude of the vibration;
+    the declared size is 1. The unit is nevertheless `dB`, because the row of the error shows this factor in decibels,
+    as for the noise of an oscillator.
     """
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
@@ -505,7 +505,7 @@ def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
 def pieces_of_vibration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
     """One-way phase spectrum of a platform's vibration along the line of sight, as power-law pieces. [rad²/Hz]
 
-    `name` is the name of the platform. The file must state the vibration by a spectrum.
+    `name` is the name of the platform. The file must state the vibration as a spectrum.
     """
     vibration = getattr(mission.platforms, name).motion_error.vibration
     k = 2 * math.pi / mission.radar.wavelength * float(counted(mission, name, 1.0, "islr"))

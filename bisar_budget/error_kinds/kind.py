@@ -241,5 +241,5 @@ class SourceKind(ErrorKind):
 
     @property
     def has_covariance(self) -> bool:
-        """Whether a mission file can state an error of this kind by a covariance."""
+        """Whether a mission file can state an error of this kind as a covariance."""
         return False

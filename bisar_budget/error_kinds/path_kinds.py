@@ -71,7 +71,7 @@ class StateKind(PathKind):
 
     @property
     def has_covariance(self) -> bool:
-        """Whether a mission file can state an error of this kind by a covariance.
+        """Whether a mission file can state an error of this kind as a covariance.
 
         This is the case for position and velocity errors.
         """

@@ -16,16 +16,16 @@ CHIP_FLOOR_DB = -40.0  # relative to the error-free peak: black in a chip
 
 
 class Verdict(NamedTuple):
-    """Verdict of the image on the limit of one row; values that are not available are None.
+    """Verdict on the limit of one row, reached from simulated images; values that are not available are None.
 
     Phases are magnitudes at the aperture edge [rad]: `published_…` follow from Table II of Rigling & Moses, `full_…`
     from the closed form of the full model, and `predicted_…` from exact ranges; `measured_…` are measured in the
     image. `…_inside` and `…_beyond` are measured at 0.9 and 1.1 times the limit. Displacements are on the ground
     (east, north) [m]: `displacement_m` follows from exact ranges, `…_published_m` from equation (25) of Rigling &
     Moses, and `…_full_m` from the full model. The smear azimuth is the direction of a line, from 0 to π;
-    `…_published_rad` follows from equation (31). For vibration and noise `measured_db` is compared with
-    `requirement_db`; for noise it has a standard error and a 95 % interval. With autofocus a second image is formed
-    at the limit `boundary_autofocus`, and refocused. `reason` and `reason_autofocus` explain the verdicts.
+    `…_published_rad` follows from equation (31) of Rigling & Moses. For vibration and noise `measured_db` is compared
+    with `requirement_db`; for noise it has a standard error and a 95 % interval. With autofocus a second image is
+    formed at the limit `boundary_autofocus`, and refocused. `reason` and `reason_autofocus` explain the verdicts.
     """
 
     id: str
@@ -92,10 +92,10 @@ class Verdict(NamedTuple):
 
 
 class VerifiedMission(NamedTuple):
-    """Verdicts of images on the limits of one mission; `conditions` describes how the images were formed.
+    """Verdicts on the limits of one mission, reached from simulated images.
 
-    `changes` are values that options put in place of the file's values. `overrides` are all influences on the
-    verdicts that are not in the file.
+    `conditions` describes how the images were formed. `changes` are values that options put in place of the file's
+    values. `overrides` are all influences on the verdicts that are not in the file.
     """
 
     file: str

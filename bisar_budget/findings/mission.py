@@ -85,7 +85,10 @@ class MissionFindings(NamedTuple):
         return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
 
     def texts_of(self, judged: JudgedRequirement | Row) -> list[str]:
-        """Texts of the requirements whose ids a row or requirement has; ids without a text are left out."""
+        """Wordings of the project's requirements whose ids a row or requirement has.
+
+        Ids without a wording are left out.
+        """
         return [
             self.requirement_texts[own_id] for own_id in judged.requirement_ids if own_id in self.requirement_texts
         ]

@@ -14,7 +14,7 @@ from bisar_budget.paths.instant import Instant
 
 
 class SatellitePass(NamedTuple):
-    """One pass of a satellite: its times, its track, and the verdict of the mission at its mid-time.
+    """One pass of a satellite: its times, its track, and the verdict on the mission at its mid-time.
 
     Attributes
     ----------

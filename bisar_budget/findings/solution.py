@@ -91,7 +91,7 @@ class Solution(NamedTuple):
     texts : mapping of float to str
         Every value of the solution, as it would be written in the mission file.
     imaged : Imaged, optional
-        Verdict of images at the best crossing, if images were formed.
+        Verdict from simulated images at the best crossing, if images were formed.
     overrides : tuple of Override
         Influences on the verdict that are not in the mission file, such as command-line options.
     """
@@ -147,7 +147,7 @@ class Solution(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """Verdict of a mission: whether it complies, its status, and the binding row.
+    """Verdict on a mission: whether it complies, its status, and the binding row.
 
     `requirement` is the requirement that sets the allowable of the binding row `row`, and `waived_by` are the ids of
     the waivers that apply.
@@ -162,7 +162,7 @@ class Standing(NamedTuple):
 
 
 class PartState(NamedTuple):
-    """Verdict of the mission with one part of the catalogue.
+    """Verdict on the mission with one part of the catalogue.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class PartState(NamedTuple):
     figures : tuple of str
         Figures that the mission takes from the part. A figure that the mission file states itself is not taken.
     standing : Standing
-        Verdict of the mission.
+        Verdict on the mission.
     own_row, own_utilization : str, float, optional
         Row with the highest utilization among the rows that depend only on `figures`, and its utilization.
     reason : str
@@ -205,9 +205,9 @@ class Comparison(NamedTuple):
 
     `parts` lists the complying parts in ascending order of margin, followed by all other parts in ascending order of
     excess. `kinds` are the compared kinds of parts, and `kept` are the parts of other kinds, which remain in the
-    mission. `overridden` are figures of parts that the mission file overrides. `imaged` is the verdict of simulated
-    images with the first complying part, if images were formed. `overrides` are settings outside the mission file
-    that influence the verdict.
+    mission. `overridden` are figures of parts that the mission file overrides. `imaged` is the verdict from simulated
+    images of the mission with the first complying part, if images were formed. `overrides` are settings outside the
+    mission file that influence the verdict.
     """
 
     file: str

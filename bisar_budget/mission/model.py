@@ -709,8 +709,8 @@ class Mission(NamedTuple):
     def line(self, path: KeyPath) -> Place | None:
         """Line number of a value in the mission file, starting at 1, and the region that the value occupies.
 
-        If the file does not contain the value, the line and the region are those of the nearest section above it, or
-        else of the first key of the file. The result is None for a mission without a file, and for a value that an
+        If the file does not contain the value, the line and the region of the nearest section above it are returned,
+        or else of the first key of the file. The result is None for a mission without a file, and for a value that an
         option has set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)

@@ -836,7 +836,7 @@ def has_body_axes(state: PlatformState, half: PerCase, margin: float = 1.0) -> B
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
     """Yield a problem for each lever arm on a platform that does not keep a horizontal direction of motion.
 
-    `half` is half the aperture time, over which the direction has to be kept. [s]
+    `half` [s] is half the aperture time; the direction has to be kept over the whole aperture.
     """
     for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
@@ -868,7 +868,7 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
     """Smallest distance between the platforms during the aperture. [m]
 
-    `apart` is the path of one platform relative to the other, and `half` is half the aperture time. [s]
+    `apart` is the path of one platform relative to the other, and `half` [s] is half the aperture time.
     """
     return np.asarray(norm(apart.place(half * _FINE_APERTURE_TIMES)).min(axis=0))
 
@@ -876,7 +876,7 @@ def least_baseline(apart: PlatformState, half: PerCase) -> Floats:
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
     """Yield a problem if, during the aperture, the platforms come too close to each other for a direct path.
 
-    `apart` is the path of one platform relative to the other, and `half` is half the aperture time. [s]
+    `apart` is the path of one platform relative to the other, and `half` [s] is half the aperture time.
     """
     least, travelled = float(least_baseline(apart, half)[0]), apart.travelled(half)
     if least < max(MIN_BASELINE_M, travelled / MAX_TRAVEL_RATIO):
@@ -891,8 +891,8 @@ def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     """Yield the slow times at which the height of a platform during the aperture may be smallest. [s]
 
-    For a quadratic path, these are the ends of the aperture and the time at which the platform stops sinking. For
-    any other path, they are spaced by 1/64 of the aperture. `half` is half the aperture time. [s]
+    For a quadratic path, these are the ends of the aperture and the time at which the platform stops sinking. For any
+    other path, they are spaced by 1/64 of the aperture. `half` [s] is half the aperture time.
     """
     yield from (-half, half)
     if not state.is_quadratic:

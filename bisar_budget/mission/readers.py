@@ -476,7 +476,7 @@ class Lines(Words):
 class Whole(Reader[int]):
     """A whole number within bounds.
 
-    The class reads such a number from its digits.
+    The class reads the number from text that has only digits and an optional minus sign.
     """
 
     is_word = True

@@ -219,7 +219,7 @@ def state_of(position_at: Callable[[Instant], Vector], instant: Instant, span: t
 def with_rate(covariance: Floats, rate: Sequence[float] | Floats) -> Floats:
     """Convert the velocities of a covariance (6, 6) to axes that rotate differently: δv becomes δv + rate × δr.
 
-    `rate` (3,) is the angular rate of the old axes relative to the new axes. [rad/s]
+    `rate` (3,) [rad/s] is the angular rate of the old axes relative to the new axes.
     """
     x, y, z = rate
     matrix = np.eye(6)

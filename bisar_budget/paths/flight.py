@@ -258,8 +258,8 @@ class Log:
     left_out : LeftOut, optional
         Records that cannot be used and are not among the fixes.
     tracks : tuple of Log
-        Logs of all tracks, if the file has several tracks and the mission file does not choose one. The fixes are
-        then those of the first track.
+        Logs of all tracks, if the file has several tracks and the mission file does not choose one. The fixes then
+        belong to the first track.
     grid : (3, 3)
         Displacement vectors due to one rounding step of each coordinate in the log, in the axes of the positions [m].
         A zero vector means that no rounding was found.
@@ -534,7 +534,7 @@ def _fit(times: Floats, log_positions: Floats, half_s: float, *, may_have_pieces
     """Fit the path with the smallest Bayesian information criterion (Schwarz 1978) to the fixes of a stretch.
 
     The path is a polynomial. If `may_have_pieces` is set, a spline is also tried, and is used if its criterion is
-    smaller. `half_s` is half the length of the stretch. [s]
+    smaller. `half_s` [s] is half the length of the stretch.
     """
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     times_inside, positions, count = times[inside], log_positions[inside], int(inside.sum())

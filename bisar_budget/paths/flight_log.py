@@ -492,8 +492,8 @@ def _accuracy_columns(
     """Find the columns that state position errors, from the cells of a header.
 
     `kind` are the names of the coordinates. `level_columns` are error columns that are already known; they come first
-    in the result. The function `refuse` is called to raise an error if a column is unclear or given twice, or if the
-    log lacks a column that is needed together with a column that it has.
+    in the result. The function `refuse` is called to raise an error if a column is unclear or given twice, or if a
+    column requires another column that the log lacks.
     """
     columns = dict(level_columns)
     has_covariance = False

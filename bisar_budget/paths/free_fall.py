@@ -38,8 +38,8 @@ class FreeFall:
         Inertial rotation rate of the axes, along the Earth's axis [rad/s]. It is zero for a scene without a position
         on the Earth; the Earth is then a sphere.
     share : float or (cases,)
-        1 in cases in which the platform is in free fall, and 0 in all other cases. In the latter, the position error
-        is p + vτ + aτ²/2, without gravity and rotation.
+        1 in cases in which the platform is in free fall, and 0 in all other cases. If it is 0, the position error is
+        p + vτ + aτ²/2, without gravity and rotation.
     """
 
     centre: Vectors
@@ -95,7 +95,7 @@ class FreeFall:
     def _matrices(self, path: PlatformState, times: Floats, cases: int) -> tuple[Floats, Floats]:
         """Matrices of the linearised dynamics: G − ω×(ω×·) (cases, nodes, 3, 3) [1/s²] and ω×· (cases, 3, 3) [1/s].
 
-        G is the gravity gradient, and ω the rotation rate of the axes. `times` are slow times (nodes, cases). [s]
+        G is the gravity gradient, and ω the rotation rate of the axes. `times` (nodes, cases) [s] are slow times.
 
         G is the second derivative of the potential of `earth.free_fall`; it was derived for this program. With the
         direction p of the Earth's axis, s = r̂·p and the equatorial radius R, the spherical Earth contributes

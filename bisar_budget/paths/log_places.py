@@ -136,7 +136,7 @@ class LogRecords:
     def keep_what_rises(self, times: Floats, start: Instant | None) -> None:
         """Mark records as unusable so that the times of the remaining records are strictly ascending.
 
-        `times` (count,) are counted from `start`. [s]
+        `times` (count,) [s] are counted from `start`.
         """
         indices = np.flatnonzero(self.is_usable)
         usable_times = times[indices]
@@ -194,8 +194,8 @@ class LogRecords:
     def _add(self, faults: Mapping[int, str], count: int) -> None:
         """Count `count` more records as left out; raises `PathFileError` if there are now too many.
 
-        `faults` are messages about these records, by line or number; if there are very many, only the first ones have
-        a message.
+        `faults` are messages about these records, by line or number; if there are very many, only the first records
+        have a message.
         """
         self._faults |= faults
         unusable = len(self._faults) - len(faults) + count + self._lost
@@ -541,7 +541,7 @@ def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str
 def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: str) -> None:
     """Refuse a log that repeats a fix while the platform moves.
 
-    `extent` is the distance that the platform moves during the whole time span of the fixes. [m]
+    `extent` [m] is the distance that the platform moves during the whole time span of the fixes.
     """
     is_repeated = np.linalg.norm(np.diff(positions, axis=0), axis=1) <= _SAME_FIX_M
     if not is_repeated.any():
@@ -564,7 +564,7 @@ def _hold_to_new_fixes(times: Floats, positions: Floats, extent: float, name: st
 def _hold_to_small_steps(times: Floats, positions: Floats, half: float, name: str) -> None:
     """Refuse a log in which a step between neighbouring fixes is too large compared with the steps around it.
 
-    `half` is half the length of the time span around mid-aperture that is checked. [s]
+    `half` [s] is half the length of the time span around mid-aperture that is checked.
     """
     steps = np.diff(times)
     velocities = np.diff(positions, axis=0) / steps[:, None]

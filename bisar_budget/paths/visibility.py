@@ -96,8 +96,8 @@ class _Sampled:
 class Watched:
     """Motion of a satellite as seen from a scene during a time span, and the parts of the span without an orbit.
 
-    Times are seconds after `origin`. If a file has several element sets or segments, the nearest of them is used at
-    each time, as in `orbits_of` for a mission.
+    Times are seconds after `origin`. A file may have several element sets or segments. The position at each time then
+    comes from one of them, chosen as in `orbits_of` for a mission.
     """
 
     origin: Instant
@@ -218,7 +218,7 @@ class Watched:
 
 
 def shared(of_transmitter: Sequence[Stretch], of_receiver: Sequence[Stretch]) -> list[Stretch]:
-    """Time spans in which both satellites are above the elevation: the overlaps of two lists of stretches."""
+    """Time spans in which both satellites are above their elevation limit: the overlaps of two lists of stretches."""
     overlaps = []
     for transmitter, receiver in product(of_transmitter, of_receiver):
         first = transmitter if transmitter.start >= receiver.start else receiver

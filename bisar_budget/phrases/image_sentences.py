@@ -69,8 +69,8 @@ def in_its_worst_phase(axes: int) -> str:
 def rule_misplaces(who: str, rule: str, by_rule: Sequence[float], is_at: Sequence[float]) -> str:
     """Sentence for several errors whose joint displacement is predicted wrongly by a rule of combination.
 
-    `by_rule` is the displacement that the rule predicts. `is_at` is the displacement that follows from exact ranges
-    and is seen in the image. Both have an east and a north component. [m]
+    `by_rule` [m] is the displacement that the rule predicts. `is_at` [m] is the displacement that follows from exact
+    ranges and is seen in the image. Both have an east and a north component.
     """
     return (
         f"{who}: {_placed(by_rule)} by {rule}, {_placed(is_at)} by exact ranges and image: "

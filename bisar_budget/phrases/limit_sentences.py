@@ -47,8 +47,9 @@ _SHOWN_PART_FRACTION = 0.99  # of a phase of equal loss, below which its quadrat
 def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
     """Sentence for one error whose quadratic phase exceeds its limit.
 
-    `phase` [rad] is the quadratic phase of the error. If the error also has a hidden phase, `phase` is the quadratic
-    phase that would cause the same peak loss as both together, and `quadratic` [rad] is the actual quadratic phase.
+    `phase` [rad] is the quadratic phase of the error. If the error also has a hidden phase (see
+    `ranges.exact_ranges`), `phase` is the quadratic phase that would cause the same peak loss as both together, and
+    `quadratic` [rad] is the actual quadratic phase.
     """
     text = in_brackets(f"QPE {over_words(phase, limit, 'rad')}", equation)
     if quadratic is None or quadratic >= _SHOWN_PART_FRACTION * phase:  # both are infinite where there is no image

@@ -78,7 +78,7 @@ def effect_is_negligible(effect_name: str, total: float, keys: Sequence[str]) ->
 
 @composed
 def nothing_judges(key: str) -> str:
-    """Sentence for a requirement that no row judges, because the file declares no error with such an effect."""
+    """Sentence for a requirement that no row judges, because no declared error has an effect that it limits."""
     return f"no declared error {_NEEDED_DECLARATIONS[key]}"
 
 

@@ -58,7 +58,7 @@ _UNIT_BY_SUFFIX = {"rad": "rad", "db": "dB"}  # by the last word of a field's na
 class Asked:
     """A requested sweep: a mission, and the cases in which it is checked.
 
-    Arguments are those of `bisar_budget.sweep`. A column that is named repeatedly is used only once.
+    The arguments are the same as for `bisar_budget.sweep`. A column that is named repeatedly is used only once.
 
     Raises
     ------

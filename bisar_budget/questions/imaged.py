@@ -57,7 +57,7 @@ def to_image(mission: Mission, solution: Solution | Comparison, model: str | Non
 
 
 def imaged(case: ToImage, progress: Progress = unseen) -> Imaged:
-    """Form images at the limit of the binding row, and return their verdict on the limit."""
+    """Form images at the limit of the binding row, and return the verdict on the limit that they show."""
     only = escape(case.row)
     if not rows_to_verify(case.mission, only):
         return Imaged(case.row, case.at, None, "its limit is not one that an image could show")

@@ -92,7 +92,7 @@ def linspace(start: object, stop: object, count: int) -> Spaced:
 def geomspace(start: object, stop: object, count: int) -> Spaced:
     """Make `count` values from `start` to `stop` with equal ratios, for `sweep`.
 
-    The arguments are those of `linspace`, but `start` and `stop` must be positive.
+    The arguments are the same as for `linspace`, but `start` and `stop` must be positive.
     """
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 

@@ -1,4 +1,4 @@
-"""Passes of a satellite over the scene of a mission, and the verdict of the mission in each pass.
+"""Passes of a satellite over the scene of a mission, and the verdict on the mission in each pass.
 
 A pass lasts as long as the satellite is above a minimum elevation; if both platforms have orbits, both satellites
 must be above it. The mid-time of a pass is the time at which the satellite sees the scene with a given squint, by
@@ -76,7 +76,7 @@ def passes(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> PassesResult:
-    """List the passes of a satellite over the scene, with the verdict of the mission in each pass.
+    """List the passes of a satellite over the scene, with the verdict on the mission in each pass.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Make the changes to a mission file that put the middle of the aperture at an instant."""
+    """Return the change to a mission file that puts the middle of the aperture at the given instant, as a list."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 

@@ -162,7 +162,7 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def status(self) -> str:
-        """Verdict of the mission: fail, not_evaluated, waived, warn, pass_with_autofocus or pass."""
+        """Verdict on the mission: fail, not_evaluated, waived, warn, pass_with_autofocus or pass."""
         return self.findings.status
 
     @property

@@ -167,7 +167,7 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
 
 
 def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """Form images at the solution to verify the binding row, and return the solution with the verdict of the images.
+    """Form images at the solution to verify the binding row, and return the solution with the resulting verdict.
 
     If there is no row to image, the solution is returned unchanged.
     """

@@ -159,7 +159,7 @@ def listed(cell: str) -> tuple[str, ...]:
 
 
 def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
-    """Make the verdict of a single mission, or of its row `row_id` if it is set.
+    """Return the verdict on a single mission, or on its row `row_id` if it is set.
 
     The mission does not comply if its status is in `breaks`.
     """

@@ -57,7 +57,7 @@ def verify_all(
     """Form images at the limits of several missions, in processes on this machine or on the workers of a scheduler.
 
     `outside` describes the influences on the verdicts that are not in the mission files. The other arguments and the
-    exceptions are those of `verify`.
+    exceptions are the same as for `verify`.
     """
     analysed = [(mission, Analysis(mission)) for mission in missions]
     total = sum(len(rows_to_verify(mission, only, analysis)) for mission, analysis in analysed)

@@ -68,22 +68,26 @@ NO_SHIFTS = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
 class PointSettings:
     """Numerical settings of the search for the image point.
 
+    The module docstring defines the matrix H, the gradient g, the hidden phase, and the function V, which has its
+    minimum at the image point.
+
     Attributes
     ----------
     end_rad : float
-        Largest hidden phase at which a path continues near a fold. If the hidden phase is larger, the path ends
-        there, because no ground point has the recorded range history. [rad]
+        Largest hidden phase at which a path of image points continues if the area is below `folded_fraction`. With a
+        larger hidden phase the path ends, because no ground point has the recorded range history. [rad]
     folded_fraction : float
-        Threshold for the root of the determinant of H (the area that the gradient g spans), as a fraction of the root
-        at the scene centre. A path with a smaller fraction is near a fold or beyond it.
+        Threshold for the area that the gradient g spans, which is the root of the determinant of H, as a fraction of
+        the area at the scene centre. Below this threshold, a path is near a fold or beyond it, and `end_rad` applies.
     near_fold_fraction : float
-        Another threshold for the same fraction. A point with a smaller fraction counts as near a fold, where the area
-        changes much in a small step, and a peak may fade into another peak.
+        Stricter threshold for the same fraction. Below it, the area changes much in a small step, so the last step
+        of a search must be smaller (`last_step_near_fold_fraction`). A peak may also fade into a wider peak there.
     last_step_rad : float
         Largest change of a phase that the last step of a search may cause. The part of the change that is linear in
         the step does not count. [rad]
     last_step_near_fold_fraction : float
-        Largest accepted square of the last step near a fold, as a fraction of the largest accepted square elsewhere.
+        Largest accepted square of the last step at a point below `near_fold_fraction`, as a fraction of the largest
+        accepted square at all other points.
     nearest_fraction : float
         Smallest accepted distance between a platform and a point, as a fraction of the nearest range. At a smaller
         distance, rounding errors dominate the direction of the line of sight.
@@ -137,8 +141,8 @@ class Effect(NamedTuple):
     """Effect of one unit of an error by the published model, with the sign of the range error.
 
     Fields are numbers for a single case, or arrays for many cases. `constant` [m/unit] and `linear` [(m/s)/unit] are
-    the constant and the linear term of the range error at the aperture midpoint. `qpe` and `cubic` are the quadratic
-    and the cubic phase at the aperture edge. [rad/unit]
+    the constant and the linear term of the range error at the aperture midpoint. `qpe` and `cubic` [rad/unit] are the
+    quadratic and the cubic phase at the aperture edge.
     """
 
     constant: PerCase
@@ -180,11 +184,11 @@ class TimeTags:
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> list[Any]:
-        """Copy `along`, the shifts or directions of one platform, and replace the values for time-tag errors.
+        """Return a copy of `along` in which the lanes with a time-tag error have the values due to this error.
 
-        Returns three arrays (nodes, lanes), one per axis. The new values are the shifts that the time-tag errors
-        `tag_s` [s] cause, in m. If `is_rate`, the new values are the changes of these shifts per second of time-tag
-        error, in m/s.
+        `along` has the shifts of one platform, or its directions if `is_rate`. The result is three arrays (nodes,
+        lanes), one per axis. The new values are the shifts [m] due to the time-tag errors `tag_s` [s]. If `is_rate`,
+        they are the changes of these shifts per second of time-tag error [m/s].
         """
         tagged = np.flatnonzero(self.case >= 0)
         (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
@@ -243,9 +247,9 @@ class Lanes:
         return Lanes(self.case.take(lanes), at_nodes, moves, directions, order, tags)
 
     def there(self, case: Indices) -> "Lanes":
-        """Rearrange the errors for the collections that `ExactRanges.at` returns for the same `case`.
+        """Return the errors for the ground points of `ExactRanges.at`, one per entry of `case`.
 
-        The result has one lane per collection. This object must have one lane per case, in the order of the cases.
+        The result has one lane per ground point. This object must have one lane per case, in the order of the cases.
         """
         return replace(self.of(case), case=np.arange(case.size))
 
@@ -266,9 +270,10 @@ class Lanes:
         return self._tagged(self.tags, self.at_nodes * size, self.directions, is_rate=True)
 
     def _tagged(self, tags: TimeTags, tag_s: Floats, along: Floats, *, is_rate: bool = False) -> Floats:
-        """Return a copy of `along`, the shifts or directions of both platforms, with new values for time-tag errors.
+        """Return a copy of `along` in which the lanes with a time-tag error have the values due to this error.
 
-        See `TimeTags.put` for these values and for `is_rate`.
+        `along` has the shifts of both platforms, or their directions if `is_rate`. `TimeTags.put` computes the new
+        values.
         """
         both = np.array([tags.put(platform, tag_s, along[platform], is_rate=is_rate) for platform in (0, 1)])
         return np.asarray(both * self.moves[:, None, None])
@@ -314,7 +319,7 @@ class SmallErrors(NamedTuple):
         return cls(np.array(list(courses.values())), course, ways, turning)
 
     def there(self, case: Indices) -> "SmallErrors":
-        """Rearrange the errors for the collections that `ExactRanges.at` returns for the same `case`."""
+        """Return the errors for the ground points of `ExactRanges.at`, one per entry of `case`."""
         courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
@@ -324,9 +329,10 @@ class ImagePoints(NamedTuple):
 
     Each field has the shape (lanes,). `is_settled` is True where the search converged. `east` and `north` [m] are the
     displacement. `quadratic` and `cubic` [rad] are the phases at the aperture edge, with the sign of the range error.
-    `hidden` [rad] is the hidden phase, and `rest` [rad] the rms of the phase beyond the cubic phase. `turn` is the
-    root of the determinant of H at the image point (the area that the gradient g spans), as a fraction of the root at
-    the scene centre. It is negative beyond a fold.
+    `hidden` [rad] is the hidden phase that the module docstring defines, and `rest` [rad] the rms of the phase beyond
+    the cubic phase. `turn` is an area ratio: the area that the range gradient spans over the aperture at the image
+    point, divided by this area at the scene centre. It is negative beyond a fold. The area is the root of the
+    determinant of the matrix H in the module docstring.
     """
 
     is_settled: Booleans
@@ -371,7 +377,7 @@ class ExactRanges:
     Parameters
     ----------
     half, k : (n,)
-        Half the aperture time [s], and the wavenumber 2π/λ at the band's centre. [rad/m]
+        Half the aperture time [s], and the wavenumber 2π/λ [rad/m] at the band's centre.
     band : (n,)
         b²: variance of the frequency over the band, divided by the square of the centre frequency.
     sampling : Sampling
@@ -497,7 +503,10 @@ class ExactRanges:
 
     @cached_property
     def near_fold(self) -> Floats:
-        """Threshold for the determinant of H, below which a point counts as near a fold, (n,)."""
+        """Threshold for the determinant of H, below which a point counts as near a fold, (n,).
+
+        The module docstring defines the matrix H. H.
+        """
         return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
     @cached_property
@@ -590,7 +599,7 @@ class ExactRanges:
     def quadratics_of(self, errors: SmallErrors) -> Floats:
         """Quadratic phase at the displaced point for one unit of each small error, (errors, cases). [rad/unit]
 
-        The values are the same as those of `effect`, computed faster for many errors.
+        The values are the same as from `effect`, but are computed faster for many errors.
         """
         weights = self.phase_weights[0]
         along = np.empty((7, *weights.shape))  # range change at the nodes per metre along each component of `ways`
@@ -638,7 +647,8 @@ class ExactRanges:
 
         The array has the shape (4, nodes, n), for the orders 0 to 3. The square of the hidden phase is the sum of the
         squares of its contributions. Range errors beyond order 3 are not included. Their weight in the hidden phase
-        is only b², which is small. The exception is a line of sight that turns by more than `MAX_TURN_RAD`.
+        is only b² (the attribute `band`), which is small. The exception is a line of sight that turns by more than
+        `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -701,8 +711,8 @@ class ExactRanges:
     def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
         """Mean squares over the aperture of range errors and of their parts beyond Legendre order 3. [m²]
 
-        Both results have the shape (..., cases). `remaining` (..., nodes, cases) are the range errors at the nodes,
-        and `orders` (..., 4, cases) their Legendre parts of orders 0 to 3. [m]
+        Both results have the shape (..., cases). `remaining` (..., nodes, cases) [m] are the range errors at the
+        nodes, and `orders` (..., 4, cases) [m] their Legendre parts of orders 0 to 3.
         """
         beyond = remaining - self.sampling.polynomials @ orders
         return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
@@ -713,17 +723,19 @@ class ExactRanges:
     ) -> ImagePoints:
         """Find the points to which errors of given sizes displace the scene centre, and the phases that remain there.
 
-        Newton's method searches from the point `near`, east and north [m]. If `is_at_fold`, a descent on V from the
-        same point is used instead. Use `point_paths` to follow an image point as an error grows. On the ground there
-        may be a line, the fold, on which the gradients of range and Doppler are parallel. Points beyond the fold are
-        not returned, because the image point does not get there as an error grows.
+        Newton's method searches from the point `near`, east and north [m]. If `is_at_fold`, a descent from the same
+        point is used instead; it decreases the phase variance V of the module docstring in each step. Use
+        `point_paths` to follow an image point as an error grows. On the ground there may be a line, the fold, on
+        which the gradients of range and Doppler are parallel. Points beyond the fold are not returned, because the
+        image point does not get there as an error grows.
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error at the nodes for a ground point and an error of given size in each lane, (nodes, lanes). [m]
+        """Range error at the nodes for errors of given sizes and for given ground points, (nodes, lanes). [m]
 
-        `point` has the coordinates of the ground points, east and north. [m]
+        Each lane has one error and one ground point. `size` has the sizes of the errors, and `point` [m] the
+        coordinates of the ground points, east and north.
         """
         lane_count = lanes.case.size
         room = self._room(lane_count)
@@ -742,8 +754,9 @@ class ExactRanges:
     def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Rate at which image points move as the errors grow, east and north. [m/unit]
 
-        `point` has the image points for errors of the sizes `size`. The image point is the minimum of V. The result
-        follows from the second derivative of V and from the change of the slope of V with the error.
+        `point` has the image points for errors of the sizes `size`. The image point is the minimum of V, the function
+        of the ground point that the module docstring defines. The result follows from the second derivative of V, and
+        from the change of the slope of V as the error grows.
         """
         course, ways, shifts = lanes.at_nodes, lanes.ways(size), lanes.shifts(size)
         tracks, true_ranges = _take_cases(self._both, lanes.case)
@@ -771,11 +784,12 @@ class ExactRanges:
     def settled(
         self, clock: Floats, shifts: Iterable[Any], near: Any, case: Indices, *, is_at_fold: bool = False
     ) -> ImagePoints:
-        """Find the image point of each lane, the minimum of V, by Newton's method, or by a descent if `is_at_fold`.
+        """Find the image point of each lane by Newton's method, or by a descent if `is_at_fold`.
 
-        A lane is one error of one case. `clock` (nodes, lanes) [m] has the range errors due to clocks. `shifts` [m]
-        has the three components of the shift of each platform at the nodes. `near` [m] is the point at which the
-        search starts, east and north. `case` has the index of the case of each lane.
+        A lane is one error of one case. The image point is the minimum of the function V in the module docstring.
+        `clock` (nodes, lanes) [m] has the range errors due to clocks. `shifts` [m] has the three components of the
+        shift of each platform at the nodes. `near` [m] is the point at which the search starts, east and north.
+        `case` has the index of the case of each lane.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, POINT_SETTINGS.samples_at_once // self.fit.shape[1]))
@@ -837,8 +851,8 @@ class _PointSearch:
 
     A lane is one error of one case. `lane` has the indices of the lanes whose search has not converged. `of` has the
     cases of these lanes, and `point` [m] their current points, east and north. `settled` has one entry for each step
-    in which the search of some lanes converged. An entry has the indices of these lanes, `_GroundView.seen` and the
-    determinant of H before the step, the step, and the points after the step.
+    in which the search of some lanes converged. An entry has the indices of these lanes, `_GroundView.seen` and
+    `_GroundView.determinant` before the step, the step, and the points after the step.
     """
 
     def __init__(
@@ -870,9 +884,10 @@ class _PointSearch:
                 self._go_on(going)
 
     def descend(self) -> None:
-        """Search by damped steps; a step that would increase V is rejected.
+        """Search by damped steps; a step that would increase the phase variance V is rejected.
 
-        This is slower than `run`, but reliable where the second derivative of V is small, such as near a fold.
+        The module docstring defines V. The search is slower than `run`, but reliable where the second derivative of V
+        is small, such as near a fold.
         """
         exact, count = self.exact, self.lane.size
         (trace,) = _take_cases([exact.matrix.xx + exact.matrix.yy], self.of)
@@ -971,7 +986,9 @@ class _PointSearch:
 
 
 class _GroundView:
-    """Range errors, lines of sight, and derivatives of V (see the module docstring), at one ground point per lane.
+    """Range errors, lines of sight, and derivatives of the phase variance V, at one ground point per lane.
+
+    The module docstring defines V, the matrix H and the scalar product ⟨a, ρ⟩.
 
     Attributes
     ----------
@@ -985,14 +1002,14 @@ class _GroundView:
     nearest : (lanes,)
         Smallest range of either platform at the nodes. [m]
     slope : (2, lanes)
-        Half the slope of V, east and north. [m]
+        Half the derivatives of V with respect to east and north. [m]
     matrix : (2, 2, lanes)
-        The matrix H of the module docstring.
+        The matrix H.
     determinant : (lanes,)
         Determinant of H.
     node_weights : (nodes, lanes)
-        Weights at the nodes for the scalar product ⟨a, ρ⟩ of the module docstring, with the range error ρ at the
-        point. The scalar product with a history a is the sum over the nodes of the weights times a.
+        Weights at the nodes for the scalar product ⟨a, ρ⟩ with the range error ρ at the point. The scalar product
+        with a history a is the sum over the nodes of the weights times a.
     bends : three of (lanes,)
         Half the second derivatives of V at the points: east-east, east-north, north-north.
     """
@@ -1014,7 +1031,7 @@ class _GroundView:
 
     @property
     def variance(self) -> Floats:
-        """Variance V, which the image point minimises, at the point of each lane, (lanes,). [m²]"""
+        """Phase variance V of the module docstring at the ground point of each lane, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
 
     def products(self, values: Floats) -> Floats:
@@ -1027,9 +1044,10 @@ class _GroundView:
         return np.asarray(np.einsum("anc,nc->ac", self._weighted[1:], self._centred @ values))
 
     def step(self, slope: Floats) -> Floats:
-        """Newton step that brings half the slope of V from `slope` to zero, (2, lanes). [m]
+        """Newton step to the point at which the slope of the phase variance V is zero, (2, lanes). [m]
 
-        The step uses half the second derivative of V, or H where V has no minimum nearby.
+        `slope` is half the slope of V at the present point. The step uses half the second derivatives of V, or the
+        matrix H where V has no minimum nearby. The module docstring defines V and H.
         """
         xx, xy, yy = self.bends
         is_bowl = (xx * yy - xy * xy > POINT_SETTINGS.bowl_fraction * self.determinant) & (xx > 0)
@@ -1040,9 +1058,9 @@ class _GroundView:
 
 
 def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
-    """Step that brings half the slope of V to zero, (2, lanes). [m]
+    """Step to the point at which the slope of the phase variance V is zero, for a quadratic V, (2, lanes). [m]
 
-    `bends` are half the second derivatives of V, and `slope` is half the slope.
+    `bends` are half the second derivatives of V (east-east, east-north, north-north), and `slope` is half its slope.
     """
     (xx, xy, yy), (x, y) = bends, slope
     return np.asarray((xy * y - yy * x, xy * x - xx * y) / (xx * yy - xy * xy))
@@ -1108,8 +1126,8 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
     ImagePoints
         Image points and remaining phases. If a search does not converge, the error is increased to its full size in
         steps. The values are NaN if no ground point has the recorded range history, or if the image point does not
-        reach such a ground point as the error grows. As in `point_paths`, no point has the history if the hidden
-        phase exceeds half a cycle and the determinant of H is small.
+        reach such a ground point as the error grows. As in `point_paths`, it is assumed that no point has the history
+        if the hidden phase exceeds half a cycle and the determinant of the matrix H of the module docstring is small.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in POINT_SETTINGS.course_steps:

@@ -37,9 +37,9 @@ class SearchSettings:
     Attributes
     ----------
     trusted_fraction, trusted_bent_fraction : float
-        Largest distance to the limit at which an interpolated size is accepted, as a fraction of the limit. The first
-        applies where the value is almost linear in the size, the second where its slope changes by more than
-        `bent_fraction` within the interval.
+        Largest distance to the limit at which an interpolated size is accepted, as a fraction of the limit.
+        `trusted_fraction` applies where the value is almost linear in the size, and `trusted_bent_fraction` where its
+        slope changes by more than `bent_fraction` within the interval.
     bent_fraction : float
         Threshold for the change of the slope within an interval, as a fraction of the slope. An interval with a
         larger change counts as bent.
@@ -48,8 +48,9 @@ class SearchSettings:
         tolerance counts as possibly above the limit.
     departure_fraction : float
         Largest accepted departure from linearity within an interval, as a fraction of the limit. The departure is the
-        difference between the rise over the interval and the rise predicted from the slope at its lower end. If the
-        departure is larger, the search also tries a size within the interval.
+        difference between two increases of the value over the interval: the actual increase, and the increase
+        predicted from the slope at the lower end of the interval. If the departure is larger, the search also tries a
+        size within the interval.
     trusted_interval_fraction : float
         Largest width of an interval within which an interpolation is trusted, as a fraction of the size.
     steep_ratio : float
@@ -99,7 +100,7 @@ class LimitSearches:
         displacement [m].
     gain : (searches,)
         Factor by which autofocus raises the limit of the quadratic phase. It does not raise the limit of the hidden
-        phase.
+        phase, which `exact_ranges` defines.
     first : (searches,)
         Size that is tried first. At this size an effect that is proportional to the size reaches the limit. [unit]
     largest : (searches,)

@@ -1,11 +1,11 @@
 """Paths of the image point as a function of the size of an error.
 
 A path is the position of the image point as a function of the size of an error. It starts at the scene centre, at
-size 0. It ends where the hidden phase exceeds π and the root of the determinant of H is less than a fifth of its
-value at the centre (see `exact_ranges` for both). For any larger error, no ground point has the recorded range
-history. Near a fold the gradients of range and Doppler are almost parallel, and the determinant of H is small. If the
-hidden phase does not exceed π at a fold, the path continues. If the peak on the path fades into a wider peak there,
-the path continues from the wider peak.
+size 0. It ends where the hidden phase exceeds π and the root of the determinant of the matrix H is less than a fifth
+of its value at the centre (`exact_ranges` defines the hidden phase and H). For any larger error, no ground point has
+the recorded range history. Near a fold the gradients of range and Doppler are almost parallel, and the determinant of
+H is small. If the hidden phase does not exceed π at a fold, the path continues. If the peak on the path fades into a
+wider peak there, the path continues from the wider peak.
 
 A lane is one error of one case. All lanes take their steps at the same time. If there are only a few lanes, each lane
 tries several sizes in one step, because this adds little computing time. `ranges.limit_search` finds the first size
@@ -44,7 +44,8 @@ class PathSettings:
         Largest distance from a peak that is lost at a fold to the wider peak into which it fades, as a fraction of
         the displacement.
     straight_fraction : float
-        Largest deviation of an almost straight path, as a fraction of the displacement.
+        Largest deviation from a straight line at which a path counts as almost straight, as a fraction of the
+        displacement.
     finest_step_fraction : float
         Smallest step, as a fraction of the size. A path that needs smaller steps ends.
     fold_fraction : float
@@ -267,8 +268,9 @@ class PointPaths:
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
         """Increase of an error's size from its last known point to the next fold; infinite without a fold. [unit]
 
-        At a fold the range and Doppler gradients are parallel, and the determinant of H is zero. A parabola through
-        the determinants (squared areas) at the last three known points is extrapolated to zero.
+        At a fold the range and Doppler gradients are parallel, and the determinant of the matrix H (see
+        `exact_ranges`) is zero. A parabola through the determinants (squared areas) at the last three known points is
+        extrapolated to zero.
         """
         before, earlier = (self._point(lane, np.maximum(index - back, 0)) for back in (1, 2))
         step, step_before = last[SIZE] - before[SIZE], before[SIZE] - earlier[SIZE]
@@ -364,9 +366,9 @@ def _extrapolated(far: Floats, middle: Floats, near: Floats, size: Floats) -> tu
 def _end_between(before: Floats, beyond: Floats) -> Floats:
     """Size at which the path ends, between a point before and a point beyond the end. [unit]
 
-    The path ends where two conditions are met: the determinant of H is small, as near a fold, and the hidden phase
-    exceeds π. The size at which each condition is first met is found by linear interpolation of the determinant or of
-    the hidden phase.
+    The path ends where two conditions are met: the determinant of the matrix H is small, as near a fold, and the
+    hidden phase exceeds π (`exact_ranges` defines both quantities). The size at which each condition is first met is
+    found by linear interpolation of the determinant or of the hidden phase.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
     to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)

@@ -39,7 +39,7 @@ class Styled:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """The status of a row or the verdict of its image, shown as a word with a mark and a colour."""
+    """The status of a row, or the verdict from its image, shown as a word with a mark and a colour."""
 
     status: str
 

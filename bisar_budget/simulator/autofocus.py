@@ -147,8 +147,7 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
 
 def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
-    """Estimate a quadratic (or quadratic and cubic) phase error from shifts between sub-aperture images, and remove
-    it.
+    """Estimate a quadratic (or also a cubic) phase error from shifts between sub-aperture images, and remove it.
 
     The phase error over a sub-aperture is mainly linear, and a linear phase shifts the image of the sub-aperture
     along y′. The shift between two images is measured by cross-correlating their powers along y′, summed over range

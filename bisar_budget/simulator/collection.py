@@ -73,8 +73,8 @@ class RangeLines:
     start, middle and end of the aperture then do not determine a point. In this case the pixels are placed along
     straight lines, with a spacing that samples the full wave-number support.
 
-    `transmitter` and `receiver` are the measured positions at an odd number of times that are evenly spaced over the
-    aperture, (times, 3). [m]
+    `transmitter` and `receiver` (times, 3) [m] are the measured positions at an odd number of times that are evenly
+    spaced over the aperture.
     """
 
     transmitter: Floats

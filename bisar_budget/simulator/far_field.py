@@ -1,7 +1,7 @@
 """Image formation with plane waves (far field): the filter (7) or (12), and the polar format (13), (14).
 
-Numbers in brackets are those of the equations of Rigling & Moses. Both methods use the approximation (5), and
-therefore defocus and displace points that are not at the scene centre.
+Numbers in brackets refer to the equations of Rigling & Moses. Both methods use the approximation (5), and therefore
+defocus and displace points that are not at the scene centre.
 """
 
 import math
@@ -27,7 +27,7 @@ _STENCIL_SAMPLES = 12  # samples that one interpolation uses
 def far_field_filter(
     history: PhaseHistory, points: Floats, method: Literal["auto", "direct", "nufft"] = "auto"
 ) -> Complexes:
-    """Form an image by the far-field filter of equation (7), which becomes equation (12) for points on the ground.
+    """Form an image by the far-field filter of Rigling & Moses, equation (7); on the ground it becomes equation (12).
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def far_field_filter(
     points : (..., 3) ndarray
         Positions of the pixels. [m]
     method : "auto", "direct" or "nufft"
-        "direct" computes the sum as in the paper. "nufft" uses finufft (extra `fast`), gives the same values to
+        "direct" computes the sum as in Rigling & Moses. "nufft" uses finufft (extra `fast`), gives the same values to
         -120 dB, and is much faster for images. "auto" uses finufft if it is installed, except if the points are so
         far apart that the grid of finufft would need too much memory.
 
@@ -110,9 +110,11 @@ def _by_nufft(history: PhaseHistory, sight: Floats, points: Floats, *, bounded: 
 
 
 class PolarFormat(NamedTuple):
-    """Image (nx, ny) formed by the polar format, and the frequency grid of equation (13) from which it was formed.
+    """Image (nx, ny) formed by the polar format, and the frequency grid from which it was formed.
 
-    `frequency_x` (Nx,) and `frequency_y` (Ny,) are the frequencies f′x and f′y of the grid. [Hz]
+    The grid is given by equation (13) of Rigling & Moses.
+
+    `frequency_x` (Nx,) and `frequency_y` (Ny,) [Hz] are the frequencies f′x and f′y of the grid.
     """
 
     image: Complexes
@@ -127,7 +129,9 @@ def polar_format(
     shape: tuple[int, int],
     centre: GroundVector = (0.0, 0.0),
 ) -> PolarFormat:
-    """Form an image by the polar format: interpolate to the frequency grid (13), then apply the FFT of (14).
+    """Form an image by the polar format: interpolate to a rectangular frequency grid, then apply an FFT.
+
+    The grid and the FFT are given by equations (13) and (14) of Rigling & Moses.
 
     The grid is a rectangle in the rotated frame within the recorded frequencies, so it omits the corners of the
     aperture. The omitted part increases with the relative bandwidth and with the squint. The frequency step of the
@@ -138,11 +142,12 @@ def polar_format(
     history : PhaseHistory
         Phase history; its frequencies and pulses must be evenly spaced.
     look_azimuth : float
-        Bistatic look direction φ_b of equation (11). [rad]
+        Bistatic look direction φ_b of equation (11) in Rigling & Moses. [rad]
     size : (2,) float
         Extent along x′ and y′, centred on the patch. [m]
     shape : (2,) int
-        Number of pixels along x′ and y′. The pixels are those of `ground_grid(centre, look_azimuth, size, shape)`.
+        Number of pixels along x′ and y′. The pixels are the result of `ground_grid(centre, look_azimuth, size,
+        shape)`.
     centre : (2,) float
         Centre of the patch, east and north [m]. The phase of a plane wave at the centre is removed from the samples
         before they are interpolated. This is equivalent to (14) at shifted pixels, with the same approximation (5).

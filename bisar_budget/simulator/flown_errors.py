@@ -64,6 +64,6 @@ def flown_together(
 ) -> Errors:
     """Convert several errors of given sizes to the total errors that the simulator applies to the data.
 
-    `sizes` holds pairs of an error and its signed size. The remaining arguments are those of `flown`.
+    `sizes` holds pairs of an error and its signed size. The remaining arguments are the same as for `flown`.
     """
     return superposed(flown(source, size, geometry, aperture_time_s) for source, size in sizes)

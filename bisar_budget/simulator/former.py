@@ -1,9 +1,9 @@
 """Image formers with a common interface for pixels, displaced points, resolution and images.
 
-Images are at baseband. With exact ranges, equation (4), a target appears at its displaced point, and the pixels are
-along lines of equal range. With plane waves, equations (7) to (14), a target appears at the point whose plane-wave
-range history is the best fit to the recorded range history, and the pixels are along the axes (x′, y′) of equation
-(10). Ground points are given as east and north. [m]
+Images are at baseband. The equation numbers refer to Rigling & Moses. With exact ranges, equation (4), a target
+appears at its displaced point, and the pixels are along lines of equal range. With plane waves, equations (7) to
+(14), a target appears at the point whose plane-wave range history is the best fit to the recorded range history, and
+the pixels are along the axes (x′, y′) of equation (10). Ground points are given as east and north [m].
 """
 
 import math
@@ -35,9 +35,10 @@ OnPixels = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactRangeFormer:
-    """Image former with exact ranges: matched filter (4), or backprojection, which gives the same image.
+    """Image former with exact ranges: matched filter, or backprojection, which gives the same image.
 
-    `is_direct` selects the matched filter. `kernel` is the interpolation kernel of the backprojection.
+    `is_direct` selects the matched filter, equation (4) of Rigling & Moses. `kernel` is the interpolation kernel of
+    the backprojection.
     """
 
     lines: RangeLines
@@ -107,11 +108,12 @@ class ExactRangeFormer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneWaves:
-    """Image former with plane waves: far-field filter (12), or polar format (13) and (14).
+    """Image former with plane waves: far-field filter, or polar format.
 
     `sight` (times, 2) holds the horizontal components of a sum of two unit vectors: from the scene centre to the
     transmitter and to the receiver, both on their measured paths. The number of slow times is odd, so that the middle
-    one is mid-aperture. `is_polar` selects the polar format.
+    one is mid-aperture. The filter is equation (12) of Rigling & Moses, and the polar format uses equations (13) and
+    (14). `is_polar` selects the polar format.
     """
 
     sight: Floats
@@ -128,14 +130,14 @@ class PlaneWaves:
 
     @property
     def azimuth(self) -> float:
-        """Bistatic look direction φ_b of equation (11), computed from the measured paths. [rad]"""
+        """Bistatic look direction φ_b of equation (11) in Rigling & Moses, computed from the measured paths. [rad]"""
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
         """Ground point at which a target appears in the image, east and north. [m]
 
-        At this point the plane-wave model (5) is the best fit to the range history `recorded` [m]: the variance of
-        the residual phase is smallest.
+        At this point the plane-wave model, equation (5) of Rigling & Moses, is the best fit to the range history
+        `recorded` [m]: the variance of the residual phase is smallest.
         """
         slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_HISTORY_ORDER + 1)
         fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _HISTORY_ORDER)
@@ -168,7 +170,7 @@ class PlaneWaves:
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
     def offsets(self, ground_points: Floats, centre: GroundVector) -> Floats:
-        """Signed distances of ground points from a centre along x′ and y′ of equation (10), in resolution cells.
+        """Signed distances of ground points from a centre along the rotated axes x′ and y′, in resolution cells.
 
         The points and the result are (n, 2).
         """
@@ -177,7 +179,7 @@ class PlaneWaves:
         return np.asarray(rotated / np.array(self.cells(centre)))
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels of a patch along the axes x′ and y′ of equation (10), (nx, ny, 3). [m]"""
+        """Pixels of a patch along the axes x′ and y′ of equation (10) in Rigling & Moses, (nx, ny, 3). [m]"""
         size = (spacing[0] * shape[0], spacing[1] * shape[1])
         return ground_grid(centre, self.azimuth, size, shape)
 

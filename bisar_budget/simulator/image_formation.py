@@ -60,7 +60,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
 def direct_sum(history: PhaseHistory, points: Floats, ranges: Callable[[Floats, int], Floats]) -> Complexes:
     """Form an image (n,) at points (n, 3) by the sum of equation (4) over pulses and frequencies.
 
-    `ranges(points, pulse)` returns the differential ranges ΔR at a pulse, (n,). [m]
+    `ranges(points, pulse)` returns the differential ranges ΔR (n,) [m] at a pulse.
     """
     image: Complexes = np.zeros(points.shape[0], dtype=complex)
     wavenumber = 2 * math.pi * history.frequency / SPEED_OF_LIGHT_MPS
@@ -126,7 +126,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
 
 
 def kernel_within(memory_limit: float) -> Kernel:
-    """Choose the backprojection kernel, "cubic" or "numpy", for a memory limit. [B]
+    """Choose the backprojection kernel, "cubic" or "numpy", for a memory limit [B].
 
     The compiled kernel "cubic" is chosen only if there is ample memory, because its code takes 60 MB.
     """
@@ -226,9 +226,9 @@ def carrier_frequency(history: PhaseHistory) -> float:
 def range_profiles(history: PhaseHistory, length: int, transform: Floats, pulses: slice) -> Complexes:
     """Range profiles of selected pulses: Σ S_k exp(+2πj k n/length), where k counts frequencies from the carrier.
 
-    A profile is the sum over frequency in equation (4), without the carrier, as a function of ΔR. It is oversampled,
-    and will be interpolated by convolution with a short kernel. To compensate for this kernel, the samples S_k are
-    first divided by its transform.
+    A profile is the sum over frequency in equation (4) of Rigling & Moses, without the carrier, as a function of the
+    differential range ΔR. It is oversampled, and will be interpolated by convolution with a short kernel. To
+    compensate for this kernel, the samples S_k are first divided by its transform.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ class PhaseHistory:
 
     `samples` is (pulses, frequencies). `slow_time` [s] is the time of each pulse, and `frequency` [Hz] is the
     frequency of each sample. Backprojection and the polar format need evenly spaced frequencies. `transmitter` and
-    `receiver` are the measured positions, (pulses, 3). [m]
+    `receiver` (pulses, 3) [m] are the measured positions.
     """
 
     samples: Complexes

@@ -98,19 +98,19 @@ class Response:
 class PointImages(NamedTuple):
     """Images of point scatterers, by default of a single one at the scene centre, and quantities that explain them.
 
-    All points are in the axes of the scene, east and north of its centre. [m]
+    All points [m] are in the axes of the scene, east and north of its centre.
 
     Images are complex, and cover the ground around the displaced targets. `in_scene` is on `scene_grid`, (nx, ny, 3),
     along (x, y), and shows as much of the patch as fits into a quarter of a million pixels. `rotated`, `focused` and
     `error_free` are on `grid`, (nx, ny, 3), along (x′, y′). This grid follows lines of equal range if the image
-    former uses exact ranges, and the axes of equation (10) if it uses plane waves. `scene_spacing` and `spacing`,
-    (2,), are the distances between neighbouring pixels of these grids. [m]
+    former uses exact ranges, and the axes of equation (10) if it uses plane waves. `scene_spacing` and `spacing` (2,)
+    [m] are the distances between neighbouring pixels of these grids.
 
     `effect` and `range_error` are for a point at the scene centre. `range_error` is the range error over `slow_time`
     without its constant and linear part. `segments` (3, 2) holds its value [m] and slope [m/s] at the three
     `segment_times`. `points` (3, 2) holds the ground points that equation (29) gives for these three segments of the
-    full range error, computed with the gradients named by `points_by`. By equation (25), the scene centre appears at
-    the second of these points.
+    full range error, computed with the gradients named by `points_by`. The scene centre appears at the second of
+    these points, by equation (25).
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
     the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` [dB] is the
@@ -171,7 +171,7 @@ class Plan:
     `rotated` is the patch of the images along (x′, y′), and `in_scene` is the patch of the image along (x, y). A
     range cell has `finer` times as many pixels as a cross-range cell. The response of a target, including its margin,
     is `own_cells` resolution cells wide in cross-range. `outside` names the paired echoes that are beyond the patch,
-    or is empty. `bytes_held` is the memory that the image formers need besides images and phase history. [B]
+    or is empty. `bytes_held` [B] is the memory that the image formers need besides images and phase history.
     """
 
     rotated: Patch
@@ -195,7 +195,7 @@ class Plan:
         return self.pulses * (self.in_scene.pixels + 2 * self.rotated.pixels)
 
     def require_memory(self, limit: float, given_pulses: int | None) -> None:
-        """Raise a `SimulationError` if the plan needs more memory than a limit. [B]
+        """Raise a `SimulationError` if the plan needs more memory than `limit` [B].
 
         The message also proposes fewer pulses if `given_pulses`, the number in the mission file, is larger than
         necessary. `given_pulses` is None if the file gives no number.

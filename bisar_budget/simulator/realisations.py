@@ -65,13 +65,13 @@ _MAX_FLOWN_STEPS = 1 << 19  # of phase noise; beyond, fast tones are interpolate
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Draw the position errors of the platforms due to a random error, for one sigma of its declared size.
+    """Draw the position errors of the platforms due to a random error of its declared size.
 
-    The error is an error of an inertial sensor or of a lever arm, or correlated position noise. The keys of the
-    result are the names of the platforms. The values [m] are (draws, times, 3): east, north, up. If the error is
-    common to both platforms, both use the same random numbers along their axes. `error.declared` only scales the
-    result; the ratios between the axes are taken from the mission. `times` (times,) are slow times within the
-    aperture. [s]
+    The error is an error of an inertial sensor or of a lever arm, or correlated position noise. Its standard
+    deviation is the declared size without the coverage factor. The keys of the result are the names of the platforms.
+    The values [m] are (draws, times, 3): east, north, up. If the error is common to both platforms, both use the same
+    random numbers along their axes. `error.declared` only scales the result; the ratios between the axes are taken
+    from the mission. `times` (times,) [s] are slow times within the aperture.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     courses = {}
@@ -227,9 +227,10 @@ def _motion(mission: Mission, name: str) -> MotionError:
 def delay_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Draw atmospheric group delays at the centre frequency for one sigma of the declared size, (draws, times). [m]
+    """Draw group delays at the centre frequency due to the atmosphere, (draws, times). [m]
 
-    The delay is for the path to one platform, or the sum for both platforms if they have the same atmosphere.
+    The standard deviation of the zenith delays is the declared size without the coverage factor. A group delay is for
+    the path to one platform, or the sum for both platforms if they have the same atmosphere.
     """
     return group_delays(mission, error, times, zenith_delays(mission, error, times, draws, rng))
 
@@ -237,7 +238,7 @@ def delay_courses(
 def zenith_delays(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Draw zenith delays in units of the declared sigma, (draws, times).
+    """Draw zenith delays in units of the declared standard deviation, (draws, times).
 
     The delays are correlated over time if the mission file states a correlation time, and constant otherwise.
     """
@@ -250,7 +251,7 @@ def zenith_delays(
 def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith: Floats) -> Floats:
     """Convert zenith delays to group delays along the signal path at the centre frequency, (draws, times). [m]
 
-    `at_zenith` (draws, times) are the zenith delays in units of the declared sigma.
+    `at_zenith` (draws, times) are the zenith delays in units of the declared standard deviation.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     of_unit = np.zeros(times.shape)
@@ -470,11 +471,12 @@ def phase_courses(
     rng: np.random.Generator,
     highest: float = math.inf,
 ) -> Floats:
-    """Draw the phases at the centre frequency due to a random error of one sigma, (draws, times). [rad]
+    """Draw the phases at the centre frequency due to a random error of its declared size, (draws, times). [rad]
 
-    The error is an error of an oscillator or of the synchronisation link, or a vibration. For the noise of an
-    oscillator, `error.declared` scales the amplitude. `times` [s] are evenly spaced over the aperture. Tones above
-    `highest` [Hz] may be omitted, unless pulse exchanges fold them to lower frequencies.
+    The error is an error of an oscillator or of the synchronisation link, or a vibration. Its standard deviation is
+    usually the declared size without the coverage factor; for the noise of an oscillator and for a vibration,
+    `error.declared` is a factor on the amplitude instead. `times` [s] are evenly spaced over the aperture. Tones
+    above `highest` [Hz] may be omitted, unless pulse exchanges fold them to lower frequencies.
     """
     return error.kind.find_in(_PHASE_DRAWS, error.subject.axis)(mission, error, times, draws, rng, highest)
 
@@ -482,10 +484,11 @@ def phase_courses(
 def _link_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, _highest: float
 ) -> Floats:
-    """Draw the phases due to measurement errors of pulse exchanges, for one sigma, (draws, times). [rad]
+    """Draw the phases due to measurement errors of pulse exchanges, (draws, times). [rad]
 
-    Between exchanges the phase is interpolated linearly. If the mission states no exchange interval, the phases at
-    different times are independent.
+    The standard deviation of an error is its declared size without the coverage factor. Between exchanges the phase
+    is interpolated linearly. If the mission states no exchange interval, the phases at different times are
+    independent.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
@@ -535,10 +538,11 @@ def _oscillator_phases(
 def _acceleration_phases(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator, highest: float
 ) -> Floats:
-    """Draw the phases of an oscillator due to the acceleration of its platform, for one sigma, (draws, times). [rad]
+    """Draw the phases of an oscillator due to the acceleration of its platform, (draws, times). [rad]
 
-    The acceleration is caused by random vibration, by slow vibration tones and by turns of the platform. Faster tones
-    are included if pulse exchanges fold them to low frequencies.
+    The acceleration sensitivity of the oscillator is the declared size without the coverage factor. The acceleration
+    is caused by random vibration, by slow vibration tones and by turns of the platform. Faster tones are included if
+    pulse exchanges fold them to low frequencies.
     """
     T, size = mission.collection.aperture_time, (error.declared or 0.0) / mission.allocation.coverage_factor
     pieces, turn_phase = pieces_by_acceleration(mission, error.owner), _TurnPhase(mission, error.owner)
@@ -614,10 +618,10 @@ def _between_exchanges(
 ) -> Floats:
     """Draw phases, and subtract straight lines between their values at successive pulse exchanges. [rad]
 
-    The result is (draws, times). The period of the tones is a whole number of exchange intervals. The spacing of
-    `times` is changed slightly, so that it also divides the period evenly. The relative change is less than the ratio
-    of the spacing to the period. `turn_phases`, if not empty, holds additional phases as functions of slow time, one
-    function for each draw.
+    The result is (draws, times). The phases are sums of tones, whose period is a whole number of exchange intervals.
+    The spacing of `times` is changed slightly, so that it also divides the period evenly. The relative change is less
+    than the ratio of the spacing to the period. `turn_phases`, if not empty, holds additional phases as functions of
+    slow time, one function for each draw.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -844,8 +848,8 @@ class _Tones:
     Fast tones are the harmonics of 1/`period`, where `period` [s] is by default four apertures. Slow tones have lower
     frequencies, in logarithmic steps, unless the edges of their frequency intervals [Hz] are given by `slow`. A
     narrow piece of the spectrum, which would contain only a few fast tones, is represented by tones of its own; these
-    follow the slow tones in the arrays. Noise at frequencies above those of the fast tones is independent at each
-    time, with the standard deviation `rest`. [rad]
+    follow the slow tones in the arrays. Noise at frequencies above the fast tones is independent at each time, with
+    the standard deviation `rest` [rad].
     """
 
     def __init__(

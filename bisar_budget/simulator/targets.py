@@ -26,7 +26,7 @@ _MAX_LIST_BYTES = 1 << 20
 class Target(NamedTuple):
     """Point target on the ground: its position relative to the scene centre, and its power.
 
-    `east` and `north` are in metres. `level_db` is the power relative to a point of amplitude 1. [dB]
+    `east` and `north` are in metres. `level_db` [dB] is the power relative to a point of amplitude 1.
     """
 
     east: float = 0.0

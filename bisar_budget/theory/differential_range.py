@@ -213,7 +213,7 @@ def ground_matrix() -> Matrix:
 
 
 def ground_inverse() -> tuple[Matrix, Expr]:
-    """Adjugate (2, 2) and determinant of Q. The adjugate divided by the determinant is Q⁻¹ of equation (30)."""
+    """Adjugate (2, 2) and determinant of the matrix Q of equation (19); their quotient is Q⁻¹ of equation (30)."""
     Q = ground_matrix()
     return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
 
@@ -240,7 +240,7 @@ def look_azimuth() -> Expr:
 def smear_direction() -> Matrix:
     """Return equation (31): the direction along which quadratic errors smear a response, with shape (2,). [-]
 
-    It is the direction of the second column of Q⁻¹.
+    It is the direction of the second column of the inverse of the matrix Q of equation (19).
     """
     adjugate, _ = ground_inverse()
     return ImmutableMatrix(in_angles(adjugate[:, 1]))

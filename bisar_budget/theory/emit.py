@@ -69,9 +69,9 @@ MathML the invisible times, so that numbers can be put in.
 class Evaluator:
     """Function to be written to the generated module: its arguments, and its results as rows of expressions.
 
-    If there are several rows, they have names. An entry of `quotients` is a name, a numerator and a denominator; the
-    name then replaces -numerator/denominator in the rows. If such a quotient is itself a result, arrays are divided
-    only once and no intermediate array is needed.
+    If there are several rows, they have names. An entry of `quotients` is a name, a numerator and a denominator. The
+    function first assigns -numerator/denominator to the name, and the rows then use the name instead of this
+    quotient. A result that is equal to the quotient is thus computed by one division, without an intermediate array.
     """
 
     name: str
@@ -366,7 +366,7 @@ _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations for a report: equations of the paper, followed by all equations of the full model.
+    """Return the equations for a report: a selection from Rigling & Moses, then all equations of the full model.
 
     Equation (30) is included only for mid-aperture.
     """

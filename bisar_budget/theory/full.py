@@ -279,7 +279,7 @@ def _of_the_direct_path() -> tuple[Equation, ...]:
 
 
 def _collected(coefficient: Expr) -> Expr:
-    """Write a coefficient as the sum of β̃ₙ, given by `table`, and the terms that result from the displacement."""
+    """Write a coefficient as β̃ₙ plus the terms that result from the displacement; the function `table` gives β̃ₙ."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 

@@ -344,8 +344,8 @@ def passed() -> Expr:
 def interpolated() -> Expr:
     """Fraction of a tone's power that remains after subtracting the straight lines between its samples.
 
-    The fraction is a function of y = 2πf·T_s. It is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each
-    frequency to which the tone is folded.
+    The fraction is a function of y = 2πf·T_s, where f is the frequency of the tone and T_s the sampling interval. It
+    is (1 − sinc²)² at the frequency of the tone, and sinc⁴ at each frequency to which the tone is folded.
     """
     fraction = positive("nu")
     error = exp(I * step * fraction) - (1 - fraction) - fraction * exp(I * step)

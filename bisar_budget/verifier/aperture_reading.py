@@ -199,7 +199,7 @@ def _squares(points: Floats) -> Floats:
 def _distance(positions: Floats, points: Floats, squares: Floats) -> Floats:
     """Distances (m, n) from positions (m, 3) to points (n, 3), accurate to 1e-8 m even from geostationary orbit. [m]
 
-    `squares` (n,) holds the squared norms of the points. [m²]
+    `squares` (n,) [m²] holds the squared norms of the points.
     """
     square: Floats = positions @ (-2 * points.T)
     square += _squares(positions)[:, None]

@@ -65,7 +65,7 @@ def verify_mission(
     mapped: MapBlocks | None = None,
     analysis: Analysis | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches the glob pattern `only`.
+    """Verify the limits of a mission, in all rows whose ids match the glob pattern `only`.
 
     The verdicts are in the order of the rows of `check`. They include verdicts on the vibration of both platforms
     together. They do not depend on `jobs`, the number of processes. After each row `progress` is called with the
@@ -139,10 +139,10 @@ def _order(vibration: Subject) -> tuple[int, int]:
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """Yield each row of sensors, clocks and sidelobes that has a limit: its id, and a function that verifies it.
+    """For each limited row of sensors, clocks and sidelobes, yield its id and a function that verifies the limit.
 
-    These are the rows of random errors, of errors that the file states by their ISLR, of oscillator tones, of PSLR,
-    and of ISLR.
+    The rows are about random errors, errors whose size the mission file gives as an ISLR, oscillator tones, PSLR, and
+    ISLR.
     """
     for error in study.analysis.random:
         sizes = limits_of(study, error)

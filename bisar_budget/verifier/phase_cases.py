@@ -150,9 +150,9 @@ def other(study: Study, source: ErrorSource) -> Verdict:
 
 
 def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
-    """Return the verdict `not_evaluated` for an error that the mission file states by its effect.
+    """Return the verdict `not_evaluated` for an error of which the mission file states only the effect.
 
-    Such an effect is, for example, an ISLR or a displacement, but not a quadratic phase.
+    The effect is, for example, an ISLR or a displacement, but not a quadratic phase.
     """
     return study.blank(row_id, limit, unit, reason=phrases.note("stated-by-its-effect"))
 
@@ -309,7 +309,7 @@ def compare(excess: float, tolerance: float) -> str:
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement (east, north) due to several errors together, by equation (25) of the paper. [m]
+    """Displacement (east, north) due to several errors together, by equation (25) of Rigling & Moses. [m]
 
     `scale` multiplies the sizes of the errors. The result is None if equation (25) has no solution.
     """
@@ -385,10 +385,10 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Return the fields of a verdict that describe a response: displacement, smear, and measures of its cut.
+    """Return the fields of a verdict that describe a response: displacement, smear, and figures from a cut.
 
-    The cut is across range. Quantities that cannot be determined, because the smear is long or the patch is curved,
-    are omitted.
+    The cut goes through the response across range. Quantities that cannot be determined, because the smear is long or
+    the patch is curved, are omitted.
     """
     chip, reference, measures = images.chip, images.reference, VerdictFields()
     try:
@@ -455,9 +455,9 @@ def location(study: Study, requirement: float) -> Verdict:
 
     The errors are scaled by a common factor so that the displacement computed by the gating model, which decides the
     verdict, equals `requirement` [m]. The limit is confirmed if the displacement in the image agrees with the gating
-    model within 5 % of the requirement. For the published model, which uses equation (25), the displacement due to
-    each single error must also agree with exact ranges. If some displacements disagree, and equation (25) makes all
-    of these too long, the limit is conservative. In the remaining cases it is optimistic.
+    model within 5 % of the requirement. For the published model, which uses equation (25) of Rigling & Moses, the
+    displacement due to each single error must also agree with exact ranges. If some displacements disagree, and
+    equation (25) makes all of these too long, the limit is conservative. In the remaining cases it is optimistic.
     """
     blank = study.blank("mission.location_error", requirement, "m")
     sizes = [(s, s.declared or 0.0) for s in study.declared]
@@ -516,7 +516,7 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
     """Find the common factor of all errors for which their displacement by the gating model equals the requirement.
 
     The result is None if the errors together do not displace the image, or if the gating model, which decides the
-    verdict, is the published model and equation (25) has no solution.
+    verdict, is the published model and equation (25) of Rigling & Moses has no solution.
     """
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)

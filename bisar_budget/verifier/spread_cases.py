@@ -106,7 +106,7 @@ Case = Callable[[], Verdict]
 
 # ---------------------------------------------------------------------- vibration
 def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield each limit on echoes or noise of vibration: the subject of its row, and a function that verifies it.
+    """For each limit on vibration (echoes or noise), yield the subject of its row and a function to verify it.
 
     There are limits for each platform alone, and for both platforms together. Vibrations with less than one cycle per
     aperture are verified in `phase_cases`.
@@ -184,8 +184,8 @@ def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence
     """Verdict on a group of vibration tones with neighbouring frequencies at their common limit.
 
     The amplitudes are scaled by a common factor, so that their declared ratios are kept. The starting phases of the
-    tones are chosen to give the highest echo. `name` is the platform. `limit` is the amplitude of a single tone with
-    the same echo. [m]
+    tones are chosen to give the highest echo. `name` is the platform. `limit` [m] is the amplitude of a single tone
+    with the same echo.
     """
     cycles = [line.frequency * study.collection.aperture_time for line in lines]
     worst = worst_phases([line.amplitude for line in lines], cycles)
@@ -247,7 +247,7 @@ def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verd
     """Verdict on a noise-like vibration at its limit: compare the ISLR added by white noise with the requirement.
 
     The ISLR is measured over one repeat interval of the image, with as many draws as the verdict needs. `limits` maps
-    platforms to their rms displacements at the limit. [m]
+    platforms to their rms displacements [m] at the limit.
     """
     collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
     slow_time = cell_centres(collection.aperture_time, _ISLR_SAMPLES)
@@ -329,7 +329,7 @@ def _model(study: Study, error: RandomError) -> str:
 
 
 def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Yield each oscillator tone with a limit: the subject of its row, and a function that verifies the limit.
+    """For each oscillator tone with a limit, yield the subject of its row and a function that verifies the limit.
 
     In images the tone is represented by a platform motion that causes the same phase.
     """
@@ -576,8 +576,8 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
 def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
     """Draw zenith delays at the slow times for which exact ranges are computed, (draws, nodes).
 
-    The delays are in units of the declared sigma. The times are the nodes of a quadrature. For delays that are
-    correlated over time, the result is their smooth part; see `_smooth_at_nodes`.
+    The delays are in units of the declared standard deviation. The times are the nodes of a quadrature. For delays
+    that are correlated over time, the result is their smooth part; see `_smooth_at_nodes`.
     """
     T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
     if correlation_time is None:
@@ -853,7 +853,7 @@ class Mainlobe:
     def lost(self, phases: Floats) -> Floats:
         """Energy that phase errors remove from the mainlobe, as a fraction of the energy of the image, (draws,).
 
-        `phases` holds the phase errors at the centres of the cells of the window, (draws, moments). [rad]
+        `phases` (draws, moments) [rad] holds the phase errors at the centres of the cells of the window.
         """
         # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
         change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves

@@ -99,7 +99,7 @@ class Study:
     def blank(self, row_id: str, limit: float, unit: str, **fields: Any) -> Verdict:
         """Create a verdict on a limit, in which the measurements are still missing.
 
-        The limit is that of the model that decides the mission's status. `limit` is in `unit`. `fields` are
+        The limit belongs to the model that decides the mission's status. `limit` is in `unit`. `fields` are
         additional fields of the verdict.
         """
         return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **fields)
@@ -154,7 +154,7 @@ class Study:
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
         """Allowable size of an error under all requirements, and the name of the requirement that sets it.
 
-        The size includes the autofocus gain. Both results are None if no requirement limits the error.
+        The autofocus gain is taken into account. Both results are None if no requirement limits the error.
         """
         limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements

@@ -127,9 +127,9 @@ def assigned(statement: ast.stmt) -> list[tuple[ast.expr, ast.expr]]:
 
 
 BOUNDS = {
-    empty_names: 354,
+    empty_names: 353,
     bare_constants: 38,
-    any_annotations: 126,
+    any_annotations: 123,
     classes_defined_twice: 0,
     constants_of_several_values: 0,
 }

@@ -234,7 +234,7 @@ def _limited_by(row: Row) -> str:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Short name of an equation for a table column.
+    """Short name of an equation of Rigling & Moses for a table column.
 
     `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, and `(25)` is not changed. `full model` and `first
     principles` become `full`. The result is empty for any other equation.

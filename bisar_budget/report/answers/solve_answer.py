@@ -1,4 +1,4 @@
-"""Output of the `solve` command: the values at which compliance begins or ends, or compared catalogue parts."""
+"""Output of the `solve` command: the values at which compliance begins or ends, or a comparison of parts."""
 
 from collections.abc import Iterator, Sequence
 
@@ -327,7 +327,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
 
 
 def _shown(imaged: Imaged) -> str:
-    """Text with the verdict of an image on the binding row, or with the reason why there is no verdict."""
+    """Text with the verdict that an image gives on the binding row, or with the reason why there is no verdict."""
     row = f"{printable(imaged.row)} at {printable(imaged.at)}"
     verdict = imaged.verdict
     if verdict is None:

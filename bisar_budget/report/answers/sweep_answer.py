@@ -1,4 +1,4 @@
-"""Output of the `sweep` command: the verdict of a mission for many sets of values.
+"""Output of the `sweep` command: the verdict on a mission for many sets of values.
 
 CSV, Parquet and NetCDF files are written part by part by `report.tables`. The formats in this module need all cases
 in memory.

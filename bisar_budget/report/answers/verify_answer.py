@@ -47,7 +47,7 @@ def records(answers: Sequence[VerifiedMission]) -> Records:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[VerifiedMission], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: limit, budget, predicted and measured value, and verdict of each row."""
+    """Text of each answer: limit, budget, predicted and measured value of each row, and the verdict on it."""
     chapters = [mission_chapter(answer, number, _blocks(answer)) for number, answer in enumerate(answers, 1)]
     return mission_document("Images at the limits", answers, chapters)
 
@@ -69,7 +69,7 @@ def evidence(rows: Sequence[Verdict]) -> Iterator[doc.Block]:
     """Yield the table of verdicts, a second table of verdicts with autofocus, and remarks on both.
 
     For a phase, the column `budget` has the allowed phase, which the error at the limit causes according to the
-    gating model (the model that decides the verdict of the row). The next column has the phase that the same error
+    gating model (the model that decides the verdict on the row). The next column has the phase that the same error
     causes according to the other model.
     """
     other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
@@ -103,7 +103,7 @@ def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
 
     They state the kind of phase in the table, the largest distance between the measured and the predicted
     displacement, and the largest angle between the measured and the predicted smear. The displacement is predicted by
-    the model that decides the verdict, and the smear by equation (31).
+    the model that decides the verdict, and the smear by equation (31) of Rigling & Moses.
     """
     hidden = [row for row in rows if row.of_equal_loss]
     if hidden:
@@ -157,8 +157,8 @@ def limit(row: Verdict) -> str:
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
     """Five table cells with the numbers of a verdict, with phases in rad.
 
-    The cells are the budget, three predictions (from Table II, from the full model, and from exact ranges), and the
-    measured value.
+    The cells are the budget, three predictions (from Table II of Rigling & Moses, from the full model, and from exact
+    ranges), and the measured value.
     """
     if row.requirement_db is not None:
         return f"{row.requirement_db:.4g} dB", "-", "-", "-", _decibel(row.measured_db)

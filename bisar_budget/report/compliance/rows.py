@@ -280,10 +280,11 @@ class Contribution:
 def phase_contributions(page: Page) -> list[Contribution]:
     """List the quadratic phase that each declared error causes by itself, largest first.
 
-    The phase includes the hidden phase: it is the quadratic phase that would cause the same peak loss as the
-    quadratic and the hidden phase together. Each contribution has its share of the sum of all phases, and its values
-    by the published and the full model. An error that is too large to form an image has an infinite phase, and comes
-    first. The sum is then infinite, and no contribution has a share.
+    The phase includes the hidden phase, which the bandwidth and the turn of the line of sight do not resolve: it is
+    the quadratic phase that would cause the same peak loss as the quadratic and the hidden phase together. Each
+    contribution has its share of the sum of all phases, and its values by the published and the full model. An error
+    that is too large to form an image has an infinite phase, and comes first. The sum is then infinite, and no
+    contribution has a share.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):

@@ -77,8 +77,8 @@ class _View(NamedTuple):
 def geometry_plan(findings: MissionFindings) -> str:
     """Draw the collection from above as SVG.
 
-    The drawing shows platforms, velocities, lines of sight, the look direction φ_b of equation (11), and the smear
-    direction of equation (31).
+    The drawing shows platforms, velocities, lines of sight, the look direction φ_b, and the smear direction. The two
+    directions are given by equations (11) and (31) of Rigling & Moses.
     """
     platforms = [
         _seen(name, state, findings, lambda vector: (vector[0], vector[1]), _direction(state.velocity)[2])
@@ -462,7 +462,7 @@ def _range(view: _View, platform: _Platform) -> str:
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
-    """Draw arrows for the look direction φ_b of equation (11) and the smear direction of (31); yield their labels."""
+    """Draw arrows for the look direction φ_b and the smear direction; yield their labels."""
     scene, look = panel.pixel(_SCENE_CENTRE), float(view.findings.geometry.look_azimuth)
     tip = _turned(scene, _LOOK_PX, look)
     ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]

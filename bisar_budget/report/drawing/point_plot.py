@@ -98,9 +98,9 @@ class ImagePanel(NamedTuple):
 
     `level_db` (nx, ny) has x or x′ along its first axis, and NaN for pixels without an image. `corners` (nx + 1, ny +
     1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets, and `shown_places` (n,
-    2) their image points by equation (25). `image_points` (n, 2) are the peaks of the targets in the image; it is
-    empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of each target by equation (29), for
-    each third of the aperture. All coordinates are in metres along `axes`.
+    2) their image points by equation (25) of Rigling & Moses. `image_points` (n, 2) are the peaks of the targets in
+    the image; it is empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of each target by
+    equation (29), for each third of the aperture. All coordinates are in metres along `axes`.
     """
 
     title: str
@@ -136,9 +136,9 @@ class Sheet(NamedTuple):
     """Data of all panels.
 
     The range error is approximated by a straight line over each third of the aperture. `segments` (3, 2, 2) has the
-    two end points of each line: time [s] and range error [mm]. `points` (3, 2) [m] are the image points for these
-    thirds, by equation (29), of a target at the scene centre. `points_by` names the gradients that are used in (29).
-    If `is_paper` is True, titles and legends have the numbers of the paper's figures and equations.
+    two end points of each line: time [s] and range error [mm]. `points` (3, 2) [m] are the image points of a target
+    at the scene centre for these thirds, by equation (29) of Rigling & Moses. `points_by` names the gradients that
+    are used in (29). If `is_paper` is True, titles and legends have the numbers of the paper's figures and equations.
     """
 
     slow_time: Floats
@@ -214,7 +214,7 @@ def sheet(images: PointImages, *, is_paper: bool = False) -> Sheet:
 
 
 def rotated_back(images: PointImages) -> Complexes:
-    """Resample the focused image to the pixels of the image along (x, y), which is the last step in the paper."""
+    """Resample the focused image to the pixels of the image along (x, y), the last step in Rigling & Moses."""
     return resampled(images.focused, images.grid, images.scene_grid)
 
 
@@ -229,8 +229,8 @@ def _segments_of(images: PointImages) -> Floats:
 def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) -> tuple[slice, slice]:
     """Slices that select the part of a patch to be drawn; its length in metres is the same along both axes.
 
-    The part contains all pixels that exceed a given level in any image, and a margin for the nearest sidelobes.
-    `peak` is the error-free peak, and `spacing` the pixel spacing along both axes. [m]
+    The part contains all pixels that exceed -20 dB relative to `peak` in any image, and a margin for the nearest
+    sidelobes. `peak` is the peak of the error-free image, and `spacing` [m] the pixel spacing along both axes.
     """
     bright = np.maximum.reduce([np.abs(image) for image in images]) > peak * 10 ** (_DRAWN_DB / 20)
     used_indices = [np.nonzero(bright.any(axis=1 - axis))[0] for axis in (0, 1)]
@@ -412,7 +412,7 @@ def flown_words(mission: Mission) -> str:
 
 
 def _stated_effect_words(mission: Mission) -> str:
-    """Describe the errors that are stated in the file by their effects.
+    """Describe the errors of which the file states only the effects.
 
     An effect can have many causes. The text therefore states the cause that is simulated in the images.
     """
@@ -598,7 +598,7 @@ def _target_mark(color: str) -> MarkStyle:
 
 
 def _prediction_mark(color: str) -> MarkStyle:
-    """Style of the mark at the image point of a target by equation (25): a circle."""
+    """Style of the mark at the image point of a target by equation (25) of Rigling & Moses: a circle."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 

@@ -590,7 +590,10 @@ def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
 
 
 def style_sheet(rules: Iterable[str], tones: Iterable[str]) -> str:
-    """CSS rules for one kind of drawing, including dark colours for a drawing in a separate file."""
+    """CSS rules for one kind of drawing.
+
+    They include the colours for dark mode, which apply only if the drawing is a file of its own.
+    """
     _, dark = colours()
     scoped = "".join(f"svg.drawing {rule}" for rule in rules)
     dark_tones = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))

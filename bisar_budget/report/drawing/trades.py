@@ -203,7 +203,7 @@ def runs(axis: Axis, statuses: NumbersOrWords) -> Iterator[tuple[str, float, flo
 
 
 class MapRegion(NamedTuple):
-    """A region of neighbouring cells of a map with the same worst row.
+    """A region of a map: neighbouring cells that have the same worst budget row.
 
     `cell` has the indices of the cell in which the name is written. `size` is the extent of the region through this
     cell, along the first and along the second axis, as numbers of cells.
@@ -229,8 +229,8 @@ def thinned(trade: Trade) -> Trade:
 def regions(rows: NumbersOrWords) -> list[MapRegion]:
     """Regions of a map that are large enough for a name.
 
-    A region consists of connected cells with the same worst row. The name is written in the cell farthest from other
-    regions. `rows` (n, m) has the worst row of each cell.
+    A region consists of connected cells with the same worst budget row. The name of the row is written in the cell
+    farthest from other regions. `rows` (n, m) identifies the worst budget row in each cell.
     """
     seen = rows == ""
     map_regions = []
@@ -248,7 +248,7 @@ def regions(rows: NumbersOrWords) -> list[MapRegion]:
 
 
 def _connected(rows: NumbersOrWords, seen: NDArray[np.bool_], start: tuple[int, int]) -> list[tuple[int, int]]:
-    """Indices of the cells that have the same worst row as the cell `start`, and are connected to it by common sides.
+    """Indices of the cells that have the same worst budget row as the cell `start`, and are connected to it by sides.
 
     These cells are marked in `seen`.
     """
@@ -286,10 +286,10 @@ def _run(line: NDArray[np.bool_], index: int) -> int:
 
 
 def borders(rows: NumbersOrWords, first: Floats, second: Floats) -> Floats:
-    """Border lines between neighbouring cells of a map with different worst rows, (count, 2, 2).
+    """Border lines between neighbouring cells of a map whose worst budget rows differ, (count, 2, 2).
 
-    Each line is given by its two end points. `rows` (n, m) has the worst row of each cell. `first` (n + 1,) and
-    `second` (m + 1,) are the edges of the cells along the two axes.
+    Each line is given by its two end points. `rows` (n, m) identifies the worst budget row in each cell. `first`
+    (n + 1,) and `second` (m + 1,) are the edges of the cells along the two axes.
     """
     lines = []
     i, j = np.nonzero(rows[1:] != rows[:-1])

@@ -30,9 +30,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     They show the value in the file, its frame and the coverage factor.
     """
     yield from stated(mission, source.path, source.declared, source.evidence)
-    if source.declared is None:
-        return
-    if not source.is_covered:
+    if source.declared is None or not source.is_covered:
         return
     if not source.is_independent:
         yield from _rotated_declaration(mission, source, source.subject.axis)
@@ -208,7 +206,7 @@ def _state_effect(analysis: Analysis, source: ErrorSource, size: float, each: st
 
 
 def _table_i(kind: StateKind, axis: str) -> str:
-    """Label of the row in Table I of the paper for a position, velocity or acceleration error along a scene axis."""
+    """Label of the row in Table I of Rigling & Moses for a position, velocity or acceleration error along an axis."""
     return f"Table I row {2 + 3 * notation.AXIS_LETTERS.index(axis) + kind.order}"
 
 
@@ -314,7 +312,7 @@ def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[
     """Quadratic phase per unit of an error along any axis, as a sum over the axes of the scene.
 
     The phase for each scene axis is multiplied by the component of the error's axis along it. The sum is returned as
-    text and as a number. [rad/unit]
+    text and as a number [rad/unit].
     """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
@@ -361,7 +359,7 @@ def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each
 
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
-    """Yield the explanation step for the displacement of the image by equation (25)."""
+    """Yield the explanation step for the displacement of the image by equation (25) of Rigling & Moses."""
     published, by_table = analysis.published, source.effect
     if published.degeneracy or source.declared is None:
         return

@@ -653,7 +653,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
 
 
 def _from_elsewhere(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation step for an error that is stated in the file only by its effect on the image."""
+    """Yield the explanation step for an error of which the file states only the effect on the image."""
     yield effect_from_elsewhere()
 
 

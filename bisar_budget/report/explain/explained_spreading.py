@@ -205,8 +205,8 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
     """Yield the explanation steps that derive the displacement of the image by a tone.
 
     The displacement follows from the polynomial orders 0 to 3 of the range error. Each item of `parts` is the part of
-    the tone along one axis or at one folded frequency. There is a step for each part. `moved` is the total
-    displacement, east and north. [m]
+    the tone along one axis or at one folded frequency. There is a step for each part. `moved` [m] is the total
+    displacement, east and north.
     """
     source = "(25)" if model == "published" else "exact ranges"
     for index, tone_part in enumerate(parts):
@@ -338,8 +338,8 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
     """Yield the explanation steps for the largest quadratic and cubic phase of a slow tone.
 
-    A tone is slow if it has less than three cycles per aperture. `free` is the peak phase of the tone without
-    synchronization. [rad]
+    A tone is slow if it has less than three cycles per aperture. `free` [rad] is the peak phase of the tone without
+    synchronization.
     """
     T = mission.collection.aperture_time
     near = [
@@ -397,7 +397,7 @@ def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for an error that is stated by its ISLR.
+    """Yield the explanation steps for an error whose size is stated as an ISLR.
 
     They show the RMS phase error that causes the same ISLR, and the limit on this phase.
     """
@@ -422,5 +422,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """Return the explanation step for an error that is declared only by its effect on the image."""
+    """Return the explanation step for an error of which the file declares only the effect on the image."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

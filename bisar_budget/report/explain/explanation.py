@@ -174,8 +174,8 @@ def _model(row: Row) -> str:
 def collection_chain(findings: MissionFindings) -> Iterator[Step]:
     """Yield the explanation steps for the quantities of a mission that depend only on the geometry.
 
-    These are the look direction of equation (11), the smear direction of (31), and det Q, the determinant of the
-    matrix in (30).
+    These are the look direction of equation (11) in Rigling & Moses, the smear direction of (31), and det Q, the
+    determinant of the matrix Q in (30).
     """
     values: dict[str, float] = {}
     for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
@@ -870,7 +870,10 @@ def _stated_by_source(doubt: InputDoubt) -> Step:
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Yield the explanation step for clock errors whose displacement of the image is unknown, with their phases."""
+    """Yield the explanation step that lists the clock errors whose displacement of the image is unknown.
+
+    For each error it gives the quadratic and the cubic phase.
+    """
     model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
     for contribution in analysis.together(model).own:

@@ -273,7 +273,7 @@ def motion_symbol(state: StateKind, axis: str, platform: str) -> str:
 
 
 def motion_coefficients(state: StateKind, axis: str, platform: str) -> dict[int, str]:
-    """Formulas in Table I for the coefficients of a motion error.
+    """Formulas in Table I of Rigling & Moses for the coefficients of a motion error.
 
     The keys of the result are the powers of slow time.
     """
@@ -282,12 +282,12 @@ def motion_coefficients(state: StateKind, axis: str, platform: str) -> dict[int,
 
 
 def motion_phase(state: StateKind, axis: str, platform: str) -> str | None:
-    """Formula in Table II for the quadratic phase of a motion error; None for position errors, which cause no QPE."""
+    """Formula in Table II of Rigling & Moses for the quadratic phase of a motion error; None for position errors."""
     return TEXTS.get(f"Table II {motion_symbol(state, axis, platform)} 0")
 
 
 def clock_coefficient(order: int) -> str:
-    """Formula in the first row of Table I for a coefficient of a clock error.
+    """Formula in the first row of Table I of Rigling & Moses for a coefficient of a clock error.
 
     `order` is the power of slow time.
     """

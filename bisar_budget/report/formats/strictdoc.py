@@ -209,9 +209,10 @@ def _origin_words(line: int | None, mission: MissionFindings, identity: Identity
 
 
 def _text_of(name: _UidName, mission: MissionFindings) -> str:
-    """Text that a mission file gives for a requirement id that the project uses.
+    """Wording that a mission file gives for a requirement of the project, found by the id of the requirement.
 
-    The text is empty if the file gives no text for the id, or if `name` refers to a finding without such an id.
+    It is empty if the file gives no wording for the id, or if `name` refers to a finding without an id of the
+    project.
     """
     return mission.requirement_texts.get(name[0], "") if len(name) == 1 else ""
 

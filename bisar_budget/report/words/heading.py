@@ -68,7 +68,10 @@ def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
 
 
 def other_overrides(mission: AboutMission) -> list[str]:
-    """List of texts about the settings from outside the mission file, one for each setting, without `--set`."""
+    """List of texts about the settings from outside the mission file, one for each setting.
+
+    Values from the option `--set` are left out.
+    """
     return _overrides(mission, with_changes=False)
 
 

@@ -29,8 +29,8 @@ class RequirementLine(NamedTuple):
 
     `decided_by` is the deciding row, or the reason why the requirement could not be judged. `remark` names the share
     of the requirement to which the utilization `use` refers, such as the share of a platform, and gives the reached
-    and the allowed value of this share. It also gives the autofocus gain and the waivers. `texts` are the texts of
-    the requirement ids.
+    and the allowed value of this share. It also gives the autofocus gain and the waivers. `texts` are the wordings
+    of the requirements whose ids the mission file assigns to this requirement.
     """
 
     requirement: JudgedRequirement
