@@ -331,8 +331,8 @@ class Oscillator(NamedTuple):
     @property
     def states_sensitivity(self) -> bool:
         """Whether the file itself states the acceleration sensitivity, instead of taking it from a part."""
-        is_of_part = "acceleration_sensitivity" in dict(self.of_parts)
-        return self.acceleration_sensitivity is not None and not is_of_part
+        comes_from_part = "acceleration_sensitivity" in dict(self.of_parts)
+        return self.acceleration_sensitivity is not None and not comes_from_part
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
