@@ -20,6 +20,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.together import Together, cubics
+from bisar_budget.arrays import Floats
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
@@ -29,7 +30,7 @@ from bisar_budget.effects.sources import distribution_of
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
-from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
+from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, in_turn, joined
 
 CONFIDENCE_LEVEL = 0.95
 DOMINANT_FRACTION = 0.5  # of the variance; an error with a larger share determines the distribution of the sum
@@ -41,6 +42,7 @@ _SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
 _VARIABLE_SUFFIXES = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
 _HIDDEN_FRACTION = 0.1  # of the quadratic phase; a hidden phase of a tenth adds half a percent to the total
 _VARIANCE_ROUNDING_FRACTION = 1e-12  # of a variance; a smaller remainder is a rounding error
+_CORRELATION_ROUNDING_FRACTION = 1e-5  # of a variance; correlations of a file have six decimals
 _CIRCLE_NODES = 4096  # number of angles for the mean of a smooth function on a circle
 
 
@@ -104,11 +106,9 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
     singles = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
         members = [singles.pop(row_id) for row_id in group.ids]
-        values, vectors = eigensystem([[float(rho) for rho in row] for row in group.correlation])
-        for index, value in enumerate(values):
-            # Correlations that are rounded to six decimals may have an eigenvalue just below zero.
-            scale = math.sqrt(max(0.0, value)) / factor
-            members_and_sizes = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
+        for index, column in independent_columns(np.array(group.correlation, float), _CORRELATION_ROUNDING_FRACTION):
+            sizes = column / factor
+            members_and_sizes = [(s, (s.declared or 0.0) * sizes[i].item()) for i, s in enumerate(members)]
             yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", members_and_sizes, full)
     for source in singles.values():
         distribution = distribution_of(mission, source)
@@ -135,14 +135,28 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
         return
     size = error.declared / (factor if error.is_covered else 1.0)  # for an oscillator its effects contain the size
     distribution = "normal" if error.is_covered else "bound"
-    covariance = np.array(error.full.covariance) * size**2
-    scale = np.diagonal(covariance).copy()
-    for index, suffix in enumerate(_VARIABLE_SUFFIXES):
-        if covariance[index, index] <= _VARIANCE_ROUNDING_FRACTION * scale[index]:
-            continue
-        column = covariance[:, index] / math.sqrt(covariance[index, index])
-        covariance = covariance - np.multiply.outer(column, column)
-        yield Variable(f"{error.id}{suffix}", error.id, error.owner, distribution, (), tuple(column.tolist()))
+    for index, column in independent_columns(np.array(error.full.covariance) * size**2):
+        variable_id = f"{error.id}{_VARIABLE_SUFFIXES[index]}"
+        yield Variable(variable_id, error.id, error.owner, distribution, (), tuple(column.tolist()))
+
+
+def independent_columns(
+    covariance: Floats, rounding: float = _VARIANCE_ROUNDING_FRACTION
+) -> Iterator[tuple[int, Floats]]:
+    """Yield the columns (n,) of the Cholesky factor of a covariance (n, n), each with its index.
+
+    The covariance may be singular, and its rows may have different units. A column is left out if the columns before
+    it leave less than the fraction `rounding` of its variance. Eigenvectors are not used: equal eigenvalues have any
+    basis of their eigenspace, and LAPACK libraries choose different ones, so that one seed would give different draws
+    on different machines.
+    """
+    variances = np.diagonal(covariance).tolist()
+    for index, variance in enumerate(variances):
+        remaining = covariance[index, index]
+        if remaining > rounding * variance:
+            column = covariance[:, index] / math.sqrt(remaining)
+            covariance = covariance - np.multiply.outer(column, column)
+            yield index, column
 
 
 def _variable(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.sampling.draws import eigensystem
+from bisar_budget.sampling.probability import independent_columns
 from tests.conftest import examples, findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"
@@ -37,16 +37,26 @@ def sigmas(correlation=None, position="1 m", velocity="5 mm/s"):
     return {"position": position, "velocity": velocity, **({"correlation": correlation} if correlation else {})}
 
 
-class TestEigenvalues:
-    @given(loadings)
-    def test_are_those_of_lapack(self, rows) -> None:
-        matrix = np.array(rows) + np.array(rows).T
-        values, vectors = eigensystem(matrix.tolist())
-        scale = np.abs(matrix).max()
-        assert sorted(values) == pytest.approx(list(np.linalg.eigvalsh(matrix)), abs=1e-13 * (1 + scale))
-        v = np.array(vectors)
-        assert v @ v.T == pytest.approx(np.eye(6), abs=1e-13)
-        assert v @ np.diag(values) @ v.T == pytest.approx(matrix, abs=1e-13 * (1 + scale))
+class TestIndependentColumns:
+    @given(loadings, st.integers(1, 6))
+    def test_they_add_to_the_covariance(self, rows, rank: int) -> None:
+        matrix = np.array(rows)[:, :rank] @ np.array(rows)[:, :rank].T
+        columns = [column for _, column in independent_columns(matrix)]
+        assert len(columns) <= 6
+        again = sum((np.multiply.outer(column, column) for column in columns), np.zeros((6, 6)))
+        assert again == pytest.approx(matrix, abs=1e-9 * (1e-300 + np.abs(matrix).max()))
+
+    @given(loadings, st.integers(1, 5))
+    def test_rounded_correlations_are_no_columns_of_their_own(self, rows, rank: int) -> None:
+        """What six decimals leave of a singular correlation is not drawn, however small its pivot."""
+        factor = np.array(rows)[:, :rank] + np.eye(6)[:, :rank]
+        sigmas = np.sqrt((factor**2).sum(axis=1))
+        if sigmas.min() < 1e-3:
+            return
+        correlation = np.round(factor @ factor.T / np.outer(sigmas, sigmas), 6)
+        columns = [column for _, column in independent_columns(correlation, 1e-5)]
+        again = sum((np.multiply.outer(column, column) for column in columns), np.zeros((6, 6)))
+        assert again == pytest.approx(correlation, abs=1e-2)
 
 
 class TestWhatIsOne:
