@@ -171,6 +171,10 @@ APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).param
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)
 
+# Missions for tests alone. The inertial unit of the first runs free over the aperture: rows `imu` and `random`.
+TEST_MISSIONS = ROOT / "tests" / "missions"
+UAV_FREE_RUNNING = TEST_MISSIONS / "uav_free_running.yaml"
+
 # Round numbers, both platforms at broadside, so that expectations can be written down by hand.
 BASE: dict[str, Any] = {
     "schema_version": 1,
