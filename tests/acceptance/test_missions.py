@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from bisar_budget.mission.model import mission_schema
-from tests.conftest import ROOT
+from tests.conftest import ROOT, mission_file
 
 HERE = Path(__file__).parent
 GOOD = sorted((HERE / "good").glob("*.yaml"))
@@ -129,13 +129,13 @@ def test_section_v_around_its_least_n_pull(run, tmp_path, n_pull, status, use) -
 
 
 # What the findings of the examples with sensors and clocks say of other values than theirs, and free-running sensors.
-FREE = "../../tests/missions/uav_free_running"
 FIXES = "rate: 5 Hz }\n"
 IN_FLIGHT = f"{FIXES}        method: filtered\n"
 VARIANTS = (
-    (FREE, "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
-    (FREE, "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error", "fail"),
-    (FREE, "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
+    ("uav_free_running", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
+    ("uav_free_running", "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error",
+     "fail"),
+    ("uav_free_running", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
     ("uav_stim300", "time: 2.48 s", "time: 5.8 s", "receiver.quadratic_phase_error", "warn"),
     ("uav_stim300", "time: 2.48 s", "time: 5.9 s", "receiver.quadratic_phase_error", "fail"),
     ("uav_stim300", "sensor: stim300", "sensor: adis16460", "receiver.islr", "pass"),
@@ -171,7 +171,7 @@ VARIANTS = (
 
 @pytest.mark.parametrize(("stem", "here", "there", "row", "status"), VARIANTS)
 def test_findings_about_sensors_and_clocks(run, tmp_path, stem, here, there, row, status) -> None:
-    text = (ROOT / f"specs/missions/{stem}.yaml").read_text(encoding="utf-8")
+    text = mission_file(stem).read_text(encoding="utf-8")
     assert here in text
     path = tmp_path / "m.yaml"
     path.write_text(text.replace(here, there), encoding="utf-8")

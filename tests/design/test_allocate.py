@@ -18,7 +18,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, UAV_FREE_RUNNING, mission_text
 from tests.families import mission_text as of_family
 
 DAY = date(2026, 11, 25)
@@ -281,7 +281,7 @@ def test_an_error_and_an_axis_of_it_are_one() -> None:
 
 
 def test_a_part_keeps_to_an_order_by_its_largest_figure() -> None:
-    given = load_mission(str(ROOT / "specs" / "missions" / "uav_stim300.yaml"))
+    given = load_mission(str(UAV_FREE_RUNNING))
     key = "platforms.receiver.motion_error.imu.gyro_bias"
     (one,) = allocate(given, keys={key: 1.0}, reserve=0.0, today=DAY).specifications
     assert one.ordered is not None
