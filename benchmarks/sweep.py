@@ -106,7 +106,8 @@ def timed(task: Callable[[], object]) -> tuple[float, float]:
 KINDS = {
     "a scene's radius": ("rigling_moses_section_v", {"scene.radius": "500 m"}),
     "the same, full model": ("rigling_moses_section_v", {"scene.radius": "500 m", "allocation.model": "full"}),
-    "inertial sensor and GNSS": ("uav_stim300", {}),
+    "inertial sensor and GNSS": ("../../tests/missions/uav_free_running", {}),
+    "inertial sensor aided by GNSS": ("uav_stim300", {}),
     "oscillators": ("ocxo_free_running", {}),
     "oscillators, synchronised": ("tandem_x_synchronized", {}),
     "a direct path": ("ocxo_direct_path", {}),
@@ -118,7 +119,7 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
     """Measure each kind of mission over apertures and bandwidths, `few` of the cases one by one."""
     print(f"{side * side} cases of an example together, and {few} of them one by one; time of one case")
     for kind, (name, changes) in KINDS.items():
-        text = MISSION.with_name(f"{name}.yaml")
+        text = MISSION.parent / f"{name}.yaml"
         mission = parse_mission(text.read_bytes(), str(text), changes=[SetValue(*one) for one in changes.items()])
         tree = read_tree(mission.data, mission.file).root
         keys = ("collection.aperture_time", "radar.bandwidth")

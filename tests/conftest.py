@@ -171,6 +171,9 @@ APART: Any = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).param
 ROOT = Path(__file__).resolve().parent.parent
 TODAY = date(2026, 11, 21)
 
+# A mission for tests alone, whose inertial unit runs free over the aperture: rows `imu` and `random`.
+UAV_FREE_RUNNING = ROOT / "tests" / "missions" / "uav_free_running.yaml"
+
 # Round numbers, both platforms at broadside, so that expectations can be written down by hand.
 BASE: dict[str, Any] = {
     "schema_version": 1,
@@ -223,6 +226,13 @@ def findings(**changes: Any) -> MissionFindings:
     """Check the base mission with changes."""
     check = _findings_of.__wrapped__ if _is_patched else _findings_of
     return check(mission_text(**changes))
+
+
+def mission_file(name: str) -> Path:
+    """Path of a mission of the repository by its name: an example, or a mission for tests alone."""
+    folders = (ROOT / "specs" / "missions", ROOT / "tests" / "missions")
+    (path,) = [folder / f"{name}.yaml" for folder in folders if (folder / f"{name}.yaml").is_file()]
+    return path
 
 
 def found_in(path: Path, model: str | None = None) -> MissionFindings:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from bisar_budget.mission.model import mission_schema
-from tests.conftest import ROOT
+from tests.conftest import ROOT, mission_file
 
 HERE = Path(__file__).parent
 GOOD = sorted((HERE / "good").glob("*.yaml"))
@@ -81,8 +81,11 @@ def test_bad_faults_point_at_the_culprit(path: Path) -> None:
         assert last in nearby, fault
 
 
-# What examples warn of: the noise of a short log decides how its path is curved.
-WARNINGS = {"sentinel1_aircraft_log": ("the noise of the log leaves the acceleration of its path uncertain",)}
+# What examples warn of: the noise of a short log decides how its path is curved; a velocity sigma of single fixes.
+WARNINGS = {
+    "sentinel1_aircraft_log": ("the noise of the log leaves the acceleration of its path uncertain",),
+    "uav_pair_l_band": ("a position sigma of 20 mm and a velocity sigma of 7 mm/s",) * 2,
+}
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=name)
@@ -125,11 +128,32 @@ def test_section_v_around_its_least_n_pull(run, tmp_path, n_pull, status, use) -
     assert row["utilization"] == pytest.approx(use, abs=1e-3)
 
 
-# What the findings of the examples with sensors and clocks say of other values than theirs.
+# What the findings of the examples with sensors and clocks say of other values than theirs, and free-running sensors.
+FIXES = "rate: 5 Hz }\n"
+IN_FLIGHT = f"{FIXES}        method: filtered\n"
 VARIANTS = (
-    ("uav_stim300", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
-    ("uav_stim300", "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error", "fail"),
-    ("uav_stim300", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
+    ("uav_free_running", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
+    ("uav_free_running", "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error",
+     "fail"),
+    ("uav_free_running", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
+    ("uav_stim300", "time: 2.48 s", "time: 5.8 s", "receiver.quadratic_phase_error", "warn"),
+    ("uav_stim300", "time: 2.48 s", "time: 5.9 s", "receiver.quadratic_phase_error", "fail"),
+    ("uav_stim300", "sensor: stim300", "sensor: adis16460", "receiver.islr", "pass"),
+    ("uav_stim300", "sensor: stim300", "sensor: mti-g", "receiver.islr", "pass"),
+    ("uav_stim300", "x5-rtk, rate: 5 Hz", "x5-standalone, rate: 5 Hz, correlation_time: 100 s",
+     "mission.location_error", "fail"),
+    ("uav_stim300", "x5-rtk, rate: 5 Hz", "x5-standalone, rate: 5 Hz, correlation_time: 100 s",
+     "receiver.quadratic_phase_error", "pass"),
+    ("uav_stim300", FIXES, IN_FLIGHT, "receiver.islr", "fail"),
+    ("uav_quick_look", "method: filtered", "method: smoothed", "receiver.islr", "pass"),
+    ("uav_quick_look", "method: filtered", "method: smoothed", "receiver.quadratic_phase_error", "pass"),
+    ("uav_quick_look", "rate: 5 Hz", "rate: 200 Hz", "receiver.islr", "fail"),
+    ("uav_quick_look", IN_FLIGHT, f"{IN_FLIGHT}        outages: [{{ from: -1.24 s, to: 1.24 s }}]\n",
+     "receiver.islr", "pass"),
+    ("uav_quick_look", IN_FLIGHT, f"{IN_FLIGHT}        outages: [{{ from: -1.24 s, to: 1.24 s }}]\n",
+     "receiver.quadratic_phase_error", "pass"),
+    ("standard_rate_turn", "heading: 0.05 deg", "heading: 5 deg", "receiver.quadratic_phase_error", "pass"),
+    ("standard_rate_turn", "heading: 0.05 deg", "method: filtered", "receiver.quadratic_phase_error", "fail"),
     ("ocxo_free_running", "time: 2.48 s", "time: 0.55 s", "receiver.quadratic_phase_error", "warn"),
     ("ocxo_free_running", "time: 2.48 s", "time: 0.7 s", "receiver.quadratic_phase_error", "fail"),
     ("ocxo_free_running", "allocation:", "autofocus: {n_pull: 2}\nallocation:", "receiver.quadratic_phase_error",
@@ -147,7 +171,7 @@ VARIANTS = (
 
 @pytest.mark.parametrize(("stem", "here", "there", "row", "status"), VARIANTS)
 def test_findings_about_sensors_and_clocks(run, tmp_path, stem, here, there, row, status) -> None:
-    text = (ROOT / f"specs/missions/{stem}.yaml").read_text(encoding="utf-8")
+    text = mission_file(stem).read_text(encoding="utf-8")
     assert here in text
     path = tmp_path / "m.yaml"
     path.write_text(text.replace(here, there), encoding="utf-8")

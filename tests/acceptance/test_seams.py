@@ -25,7 +25,7 @@ from bisar_budget.questions.outside import day_of
 from bisar_budget.report.answers.verify_answer import geometry_remarks
 from bisar_budget.simulator.realisations import drawn_errors
 from bisar_budget.simulator.targets import parse_targets
-from tests.conftest import ROOT, findings, mission_text
+from tests.conftest import ROOT, findings, mission_file, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"
 SECTION_V, TANDEM_X, DRONES = (
@@ -112,9 +112,9 @@ def test_an_interval_of_95_percent_is_that() -> None:
     assert found.confidence == 0.95
 
 
-@pytest.mark.parametrize("name", ["uav_stim300", "ocxo_free_running"])
+@pytest.mark.parametrize("name", ["uav_stim300", "uav_free_running", "ocxo_free_running"])
 def test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks(name: str) -> None:
-    mission = bb.load(MISSIONS / f"{name}.yaml")
+    mission = bb.load(mission_file(name))
     once, twice = (
         drawn_errors(Analysis(one)) for one in (mission, mission.replace({"allocation.coverage_factor": 2}))
     )

@@ -8,7 +8,7 @@ import pytest
 
 from bisar_budget.faults import closed, fault_words, sentences
 from tests.acceptance.test_missions import BAD
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, UAV_FREE_RUNNING, mission_text
 
 SECTION_V = ROOT / "specs/missions/rigling_moses_section_v.yaml"
 
@@ -134,7 +134,7 @@ def test_a_hint_that_asks_has_no_full_stop_behind_it(run) -> None:
 
 def test_an_unknown_part_has_its_hint_last(run) -> None:
     """The hint stood before the value that was given."""
-    file = str(ROOT / "specs/missions/uav_stim300.yaml")
+    file = str(UAV_FREE_RUNNING)
     said = run("check", file, "-q", "--set", "platforms.receiver.motion_error.sensor=stim30").stderr
     assert said.endswith(
         "is no part of the catalogue (got stim30); accepted: parts of the kind imu or gnss. `bisar-budget sensors` "

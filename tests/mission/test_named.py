@@ -12,7 +12,7 @@ from bisar_budget.mission.load import load_mission, named_by
 from bisar_budget.mission.quantities import tree_of
 from bisar_budget.questions.asked import Asked, part_of
 from bisar_budget.questions.cases import grid, words_of
-from tests.conftest import ROOT
+from tests.conftest import ROOT, UAV_FREE_RUNNING
 
 MISSIONS = ROOT / "specs" / "missions"
 
@@ -20,6 +20,7 @@ MISSIONS = ROOT / "specs" / "missions"
 @pytest.fixture
 def missions(tmp_path: Path) -> Path:
     shutil.copytree(MISSIONS, tmp_path / "missions")
+    shutil.copy(UAV_FREE_RUNNING, tmp_path / "missions")
     return tmp_path / "missions"
 
 
@@ -27,6 +28,7 @@ def missions(tmp_path: Path) -> Path:
     ("name", "paths", "parts"),
     [
         ("sentinel1_aircraft_log", 2, 0),
+        ("uav_free_running", 0, 2),
         ("uav_stim300", 0, 2),
         ("rigling_moses_section_v", 0, 0),
     ],
@@ -35,7 +37,7 @@ def test_cases_are_checked_without_the_files(missions: Path, name: str, paths: i
     text = (missions / f"{name}.yaml").read_text(encoding="utf-8")
     if parts:  # a part of the project's own
         shutil.copy(ROOT / "specs" / "sensors" / "stim300.yaml", missions / "own.yaml")
-        text = text.replace("sensor: [stim300,", "sensor: [own.yaml,")
+        text = text.replace("sensor: [stim300,", "sensor: [own.yaml,").replace("sensor: stim300", "sensor: own.yaml")
         assert "own.yaml" in text
         (missions / f"{name}.yaml").write_text(text, encoding="utf-8")
     mission = load_mission(str(missions / f"{name}.yaml"))
@@ -55,7 +57,7 @@ def test_cases_are_checked_without_the_files(missions: Path, name: str, paths: i
 def test_what_the_words_of_a_sweep_name_is_taken_along(missions: Path) -> None:
     for name in ("one", "other"):
         shutil.copy(ROOT / "specs" / "sensors" / "stim300.yaml", missions / f"{name}.yaml")
-    file = missions / "uav_stim300.yaml"
+    file = missions / UAV_FREE_RUNNING.name
     loaded = load_mission(str(file))
     cases = grid(
         tree_of(loaded), ["platforms.receiver.motion_error.sensor.0=one.yaml,other.yaml", "radar.bandwidth=50MHz"]

@@ -19,7 +19,7 @@ from bisar_budget.questions.allocate import SpecificationSheet
 from bisar_budget.questions.row_uses import SpecifiedMission
 from bisar_budget.questions.specified import Specified, catalogue, specified_errors, suitable_parts, usual_keys
 from bisar_budget.questions.table import Variation
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, UAV_FREE_RUNNING, mission_text
 from tests.families import mission_text as of_family
 
 DAY = date(2026, 11, 25)
@@ -282,7 +282,7 @@ def test_an_error_and_an_axis_of_it_are_one() -> None:
 
 
 def test_a_part_keeps_to_an_order_by_its_largest_figure() -> None:
-    given = load_mission(str(ROOT / "specs" / "missions" / "uav_stim300.yaml"))
+    given = load_mission(str(UAV_FREE_RUNNING))
     key = "platforms.receiver.motion_error.imu.gyro_bias"
     (one,) = bb.allocate(given, keys={key: 1.0}, reserve=0.0, date=DAY).found.specifications
     assert one.ordered is not None

@@ -23,13 +23,11 @@ from bisar_budget.questions.missions import Spaced
 from bisar_budget.questions.passes import angle_of
 from bisar_budget.questions.table import Table
 from docs._ext.blocks import blocks
-from tests.conftest import COMPLIES, ROOT, mission_text
+from tests.conftest import COMPLIES, ROOT, UAV_FREE_RUNNING, mission_text
 from tests.questions.user_script import report
 
 MISSIONS = ROOT / "specs" / "missions"
-SECTION_V, UAV, TANDEM_X = (
-    MISSIONS / f"{name}.yaml" for name in ("rigling_moses_section_v", "uav_stim300", "tandem_x")
-)
+SECTION_V, TANDEM_X = (MISSIONS / f"{name}.yaml" for name in ("rigling_moses_section_v", "tandem_x"))
 TIME = "collection.aperture_time"
 AZIMUTH = "platforms.receiver.azimuth"
 DAY = "2026-11-21"
@@ -296,11 +294,11 @@ def test_answers_are_those_of_the_commands(run: Any, mission: bb.Mission) -> Non
     # QPE grows with T²: 6 s times the root of π/8 over the 4.634 rad of Section V.
     assert solved.value == pytest.approx(1.748, abs=1e-3)
     assert bb.sensitivity(mission).to_dict() == printed(run, "sensitivity", SECTION_V)
-    uav = bb.load(UAV)
-    assert bb.allocate(uav).to_dict() == printed(run, "allocate", UAV)
+    uav = bb.load(UAV_FREE_RUNNING)
+    assert bb.allocate(uav).to_dict() == printed(run, "allocate", UAV_FREE_RUNNING)
     keys = ["platforms.receiver.motion_error.velocity"]
     assert bb.allocate(uav, keys, reserve=0.1).to_dict() == printed(
-        run, "allocate", UAV, "--for", *keys, "--reserve", 10
+        run, "allocate", UAV_FREE_RUNNING, "--for", *keys, "--reserve", 10
     )
     drawn = bb.monte_carlo(bb.load(TANDEM_X), 5000).to_dict()
     assert drawn == printed(run, "check", TANDEM_X, "--monte-carlo", 5000)["missions"][0]["monte_carlo"]
@@ -341,9 +339,9 @@ def answers(mission: bb.Mission) -> dict[str, Any]:
         ),
         "mission": mission,
         "solve": bb.solve(mission, TIME),
-        "parts": bb.solve(bb.load(UAV), "platforms.receiver.motion_error.sensor"),
+        "parts": bb.solve(bb.load(UAV_FREE_RUNNING), "platforms.receiver.motion_error.sensor"),
         "sensitivity": bb.sensitivity(mission),
-        "allocate": bb.allocate(bb.load(UAV)),
+        "allocate": bb.allocate(bb.load(UAV_FREE_RUNNING)),
         "monte_carlo": bb.monte_carlo(bb.load(TANDEM_X), 1000),
         "verify": bb.verify(mission, "receiver.velocity.y", jobs=1),
         "simulate": bb.simulate(mission),
@@ -485,10 +483,10 @@ def test_cases_of_a_file(run: Any, tmp_path: Path, mission: bb.Mission) -> None:
 
 
 def test_an_offer_is_held_to_specifications() -> None:
-    asked = bb.load(UAV)
+    asked = bb.load(UAV_FREE_RUNNING)
     found = bb.allocate(asked, offer=asked)
     assert found.offer is not None
-    assert found.offer.file == str(UAV)
+    assert found.offer.file == str(UAV_FREE_RUNNING)
     assert found.to_dict()["missions"][0]["offer"]["status"] == found.offer.status
 
 

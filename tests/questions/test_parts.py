@@ -18,11 +18,11 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.parts import entries, folders
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.verifier import spread_cases
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, UAV_FREE_RUNNING, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"
 SECTION_V = str(MISSIONS / "rigling_moses_section_v.yaml")
-UAV = str(MISSIONS / "uav_stim300.yaml")
+UAV = str(UAV_FREE_RUNNING)
 OCXO = str(MISSIONS / "ocxo_free_running.yaml")
 SENSOR, OSCILLATOR = "platforms.receiver.motion_error.sensor", "platforms.receiver.oscillator.sensor"
 DAY = date(2026, 1, 1)

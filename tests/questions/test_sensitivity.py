@@ -26,7 +26,7 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.questions import sensitivity as asking
 from bisar_budget.questions.progress import watched_checks
 from bisar_budget.report.drawing import tornado
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, UAV_FREE_RUNNING, mission_file, mission_text
 from tests.drawing import Drawing
 
 MISSIONS = ROOT / "specs" / "missions"
@@ -170,7 +170,7 @@ def test_where_the_worst_row_changes_within_the_step_it_is_said() -> None:
 
 def test_a_share_takes_from_the_others() -> None:
     """They sum to 1; 1 % more for one leaves 1 - 1.01 s of 1 - s to each of the others."""
-    file = str(MISSIONS / "uav_stim300.yaml")
+    file = str(UAV_FREE_RUNNING)
     found = ask(file=file)
     by_key = slopes(found)
     assert found.worst_row == "receiver.quadratic_phase_error"
@@ -237,10 +237,13 @@ class TestParts:
 
     @pytest.mark.parametrize(
         "name",
-        ["uav_stim300", "ocxo_free_running", "ocxo_direct_path", "tandem_x_synchronized", "sentinel1_fixed_receiver"],
+        [
+            *("uav_stim300", "uav_free_running", "ocxo_free_running", "ocxo_direct_path", "tandem_x_synchronized"),
+            "sentinel1_fixed_receiver",
+        ],
     )
     def test_a_file_that_states_them_is_the_same_mission(self, name: str) -> None:
-        mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+        mission = load_mission(str(mission_file(name)))
         taken = mission.taken
         assert bool(taken) == names_parts(mission)
         changes = [SetValue(one.key, json.dumps(one.value)) for one in taken]
@@ -253,7 +256,7 @@ class TestParts:
 
     def test_a_slope_is_that_of_parts_with_other_figures(self, tmp_path: Path) -> None:
         """Two parts whose files differ by 1 % to both sides of the catalogue's."""
-        text = (MISSIONS / "uav_stim300.yaml").read_text(encoding="utf-8")
+        text = UAV_FREE_RUNNING.read_text(encoding="utf-8")
         part = (ROOT / "specs" / "sensors" / "stim300.yaml").read_text(encoding="utf-8")
         uses = []
         for factor in (0.99, 1.01):
@@ -267,18 +270,16 @@ class TestParts:
             uses.append(
                 max(row.utilization or 0.0 for row in found.rows if row.id == "receiver.quadratic_phase_error")
             )
-        slope = slopes(ask(file=str(MISSIONS / "uav_stim300.yaml")))[
-            "platforms.receiver.motion_error.imu.velocity_random_walk"
-        ]
+        slope = slopes(ask(file=str(UAV_FREE_RUNNING)))["platforms.receiver.motion_error.imu.velocity_random_walk"]
         assert slope.change == pytest.approx((uses[1] - uses[0]) / 2, rel=1e-6)
         assert (slope.part, slope.text, slope.per_text) == ("stim300", "0.024 m/s/sqrt(h)", "1 %")
 
     def test_what_the_file_states_itself_is_of_no_part(self) -> None:
-        found = slopes(ask(file=str(MISSIONS / "uav_stim300.yaml")))
+        found = slopes(ask(file=str(UAV_FREE_RUNNING)))
         assert found["platforms.receiver.motion_error.imu.attitude"].part == ""
         key = "platforms.receiver.motion_error.velocity"
         assert found[key].part == "mosaic-x5-rtk"
-        assert slopes(ask(f"{key}=2 cm/s", file=str(MISSIONS / "uav_stim300.yaml")))[key].part == ""
+        assert slopes(ask(f"{key}=2 cm/s", file=str(UAV_FREE_RUNNING)))[key].part == ""
 
     def test_every_point_of_a_mask_counts_per_decibel(self) -> None:
         found = slopes(ask(file=str(MISSIONS / "ocxo_free_running.yaml")))
@@ -287,7 +288,7 @@ class TestParts:
         assert point.change > 0
 
     def test_the_table_and_json_name_the_part(self, run: Callable) -> None:
-        file = str(MISSIONS / "uav_stim300.yaml")
+        file = str(UAV_FREE_RUNNING)
         assert "0.03 m/s (mosaic-x5-rtk)" in run("sensitivity", file).stdout
         (mission,) = json.loads(run("sensitivity", file, "--format", "json").stdout)["missions"]
         parts = {number["key"]: number["part"] for number in mission["numbers"]}

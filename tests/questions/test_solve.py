@@ -21,7 +21,7 @@ from bisar_budget.mission.quantities import QuestionError, number_of, range_of
 from bisar_budget.questions import solve as solving
 from bisar_budget.questions.table import breaking
 from bisar_budget.questions.varied import scaled
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, mission_file, mission_text
 from tests.standing import standing
 
 MISSIONS = ROOT / "specs" / "missions"
@@ -176,6 +176,7 @@ def test_a_pair_of_crossings_between_two_places_is_found() -> None:
             "platforms.transmitter.motion_error.acceleration.0",
             {"row": "transmitter.acceleration.x"},
         ),
+        ("uav_free_running", "collection.aperture_time", {"row": "receiver.quadratic_phase_error", "target": "warn"}),
         ("uav_stim300", "collection.aperture_time", {"row": "receiver.quadratic_phase_error", "target": "warn"}),
         ("drones_same_gnss", "radar.bandwidth", {}),
         ("one_stationary_spotlight", "platforms.receiver.azimuth", {}),
@@ -183,7 +184,7 @@ def test_a_pair_of_crossings_between_two_places_is_found() -> None:
 )
 def test_what_is_said_of_a_value_is_what_check_says(name: str, key: str, more: dict[str, str]) -> None:
     """Both sides of every crossing, the nearest and the file's own value, each as a file would have it."""
-    file = str(MISSIONS / f"{name}.yaml")
+    file = str(mission_file(name))
     found = solve(key, file=file, **more)
     states = [found.nearest, *(state for one in found.crossings for state in (one.inside, one.outside))]
     for state in states:
@@ -231,8 +232,8 @@ def test_scaling_multiplies_what_an_error_is_sized_by() -> None:
 
 def test_scaling_takes_a_covariance_and_parts_of_the_catalogue() -> None:
     compared = set()
-    for name in ("drones_same_gnss", "uav_stim300"):
-        mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+    for name in ("drones_same_gnss", "uav_free_running"):
+        mission = load_mission(str(mission_file(name)))
         twice = scaled(mission, "platforms.receiver.motion_error", 2.0)
         rows = {row.id: row for row in check_mission(mission, DAY).rows}
         for row in check_mission(twice, DAY).rows:

@@ -24,7 +24,7 @@ from bisar_budget.questions.cases import grid as cases_of
 from bisar_budget.questions.cases import sample
 from bisar_budget.questions.table import breaking
 from bisar_budget.ranges.limit_search import LIMIT_FRACTION
-from tests.conftest import ROOT, examples, mission_text, row
+from tests.conftest import ROOT, UAV_FREE_RUNNING, examples, mission_file, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
 from tests.fuzz import case
@@ -221,12 +221,13 @@ EXAMPLES = [
 ]
 # Sensors; clocks that run free, are synchronised or replaced by the direct path; covariances; an orbit and a log.
 INSTRUMENTS = [
-    "uav_stim300.yaml",
-    "ocxo_free_running.yaml",
-    "tandem_x_synchronized.yaml",
-    "ocxo_direct_path.yaml",
-    "drones_same_gnss.yaml",
-    "sentinel1_aircraft_log.yaml",
+    "uav_stim300",
+    "uav_free_running",
+    "ocxo_free_running",
+    "tandem_x_synchronized",
+    "ocxo_direct_path",
+    "drones_same_gnss",
+    "sentinel1_aircraft_log",
 ]
 
 
@@ -243,13 +244,13 @@ def test_examples_are_held_whole(name) -> None:
 @pytest.mark.parametrize("name", INSTRUMENTS)
 def test_sensors_and_clocks_are_held(name) -> None:
     """Every row of what the mission names, and the rows that count it."""
-    mission = load_mission(str(MISSIONS / name))
+    mission = load_mission(str(mission_file(name)))
     T, f = mission.collection.aperture_time, mission.radar.center_frequency
     axes = {"radar__center_frequency": [0.9 * f, f], "allocation__coverage_factor": [1.0, 2.0]}
     if not flies_on_earth(mission):
         axes["collection__aperture_time"] = [0.3 * T, 1.7 * T]
     cases = grid(mission, **axes)
-    kinds = ("imu", "random", "oscillator", "synchronization", "islr")
+    kinds = ("imu", "random", "navigation", "oscillator", "synchronization", "islr")
     rows = [row.id for row in check_mission(mission, DAY).rows if row.subject.kind in kinds]
     fields = ("declared", "allowable", "margin", "utilization", "status", "qpe_published_rad", "cubic_rad")
     columns = [f"{row}.{field}" for row in rows for field in fields]
@@ -777,7 +778,7 @@ class TestWords:
     @staticmethod
     def as_checked(name: str, texts: list[str], columns: tuple[str, ...] = (), jobs: int = 1) -> tuple[Any, int]:
         """Every case of a sweep held to a check of the mission that has its words and numbers."""
-        mission = load_mission(str(MISSIONS / f"{name}.yaml"))
+        mission = load_mission(str(mission_file(name)))
         cases = cases_of(tree_of(mission), texts)
         whole = swept(mission, cases, columns, jobs=jobs)
         for place in range(cases.count):
@@ -815,11 +816,11 @@ class TestWords:
     def test_parts_of_the_catalogue(self) -> None:
         """A row that only one part has is a column without a value for the other."""
         texts = ["platforms.receiver.motion_error.sensor.0=stim300,adis16405", "collection.aperture_time=1,3s"]
-        mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
+        mission = load_mission(str(UAV_FREE_RUNNING))
         known = {row.id for row in check_mission(mission, DAY).rows}
         columns = tuple(f"{row}.utilization" for row in sorted(known) if ".imu" in row or "random" in row)
         assert columns
-        self.as_checked("uav_stim300", texts, columns)
+        self.as_checked("uav_free_running", texts, columns)
 
     def test_a_row_of_one_word_alone_is_a_column(self) -> None:
         """Without a part the mission has no row of inertial sensors."""
@@ -845,7 +846,7 @@ class TestWords:
     def test_processes_find_the_same(self, monkeypatch) -> None:
         monkeypatch.setattr("bisar_budget.questions.asked._MIN_SHARED_PART_COUNT", 2)
         texts = ["platforms.receiver.motion_error.sensor.0=stim300,imx5", "collection.aperture_time=1:3s:75"]
-        mission = load_mission(str(MISSIONS / "uav_stim300.yaml"))
+        mission = load_mission(str(UAV_FREE_RUNNING))
         cases = cases_of(tree_of(mission), texts)
         column = ["receiver.imu.attitude.islr_db"]  # which arrays do not hold
         alone, shared = swept(mission, cases, column), swept(mission, cases, column, jobs=2)

@@ -19,7 +19,7 @@ from bisar_budget.report.answers import ANSWERS, Records, format_of_file, module
 from bisar_budget.report.renderers.markdown import markdown
 from bisar_budget.report.renderers.text import text as terminal_text
 from bisar_budget.report.renderers.xlsx import workbook
-from tests.conftest import COMPLIES, ROOT, mission_text
+from tests.conftest import COMPLIES, ROOT, UAV_FREE_RUNNING, mission_text
 from tests.page import read_page
 
 MISSIONS = ROOT / "specs" / "missions"
@@ -35,7 +35,7 @@ def answers() -> Mapping[str, Any]:
     return {
         "solve": bb.solve(named, TIME),
         "sensitivity": bb.sensitivity(named),
-        "allocate": bb.allocate(bb.load(MISSIONS / "uav_stim300.yaml")),
+        "allocate": bb.allocate(bb.load(UAV_FREE_RUNNING)),
         "passes": bb.passes(bb.load(ORBIT), "2021-03-19", days=1),
         "verify": bb.verify(named, "receiver.velocity.*"),
         "sweep": bb.sweep(named, {TIME: bb.linspace("1 s", "5 s", 3)}),

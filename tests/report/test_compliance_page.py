@@ -16,7 +16,7 @@ import pytest
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.questions.checks import with_studies
 from bisar_budget.report import Style, render
-from tests.conftest import ROOT, findings, found_in
+from tests.conftest import ROOT, UAV_FREE_RUNNING, findings, found_in
 from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, illustrated
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -41,9 +41,9 @@ def studied() -> Report:
     asked = [
         (SECTION_V, [f"{TIME}=1:9s:9"]),
         (SECTION_V, [f"{TIME}=1:9s:9", "platforms.receiver.azimuth=0:180deg:9"]),
-        (MISSIONS / "uav_stim300.yaml", [f"{SENSOR}=stim300,adis16405,mti-g,hg1700"]),
-        (MISSIONS / "uav_stim300.yaml", [f"{SENSOR}=stim300,mti-g", f"{TIME}=1:5s:5"]),
-        (MISSIONS / "uav_stim300.yaml", ["allocation.model=published,full", "allocation.combine=each,sum,rss"]),
+        (UAV_FREE_RUNNING, [f"{SENSOR}=stim300,adis16405,mti-g,hg1700"]),
+        (UAV_FREE_RUNNING, [f"{SENSOR}=stim300,mti-g", f"{TIME}=1:5s:5"]),
+        (UAV_FREE_RUNNING, ["allocation.model=published,full", "allocation.combine=each,sum,rss"]),
     ]
     missions = [with_studies([found_in(file)], texts, None, date(2026, 1, 1))[0] for file, texts in asked]
     return Report("1.2.3", tuple(missions))

@@ -14,7 +14,7 @@ from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.report import Style, render
 from bisar_budget.report.words.sentences import percent, spreadsheet_text
-from tests.conftest import ROOT, TEXT_FORMATS, findings
+from tests.conftest import ROOT, TEXT_FORMATS, UAV_FREE_RUNNING, findings
 
 ROW_KEYS = [
     "id", "metric", "unit", "declared", "allowable", "allowable_published", "allowable_full", "qpe_published_rad",
@@ -294,7 +294,7 @@ def test_what_a_mask_is_extrapolated_by_stands_in_a_report(run) -> None:
 def test_a_cubic_phase_without_requirement_is_not_called_none(run, tmp_path) -> None:
     """By the published model a gyro's bias has nothing but a cubic phase; the line of sight was said to miss it."""
     mission = tmp_path / "m.yaml"
-    text = (ROOT / "specs" / "missions" / "uav_stim300.yaml").read_text(encoding="utf-8")
+    text = UAV_FREE_RUNNING.read_text(encoding="utf-8")
     mission.write_text(re.sub(r"(?m)^ +islr:.*\n", "", text), encoding="utf-8")
     text = run("check", mission, "--model", "published", "--format", "json").stdout
     (row,) = [row for row in json.loads(text)["missions"][0]["rows"] if row["id"] == "receiver.imu.gyro_bias"]

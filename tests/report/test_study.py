@@ -20,7 +20,7 @@ from tests.page import read_page
 
 SECTION_V = "specs/missions/rigling_moses_section_v.yaml"
 SPOTLIGHT = "specs/missions/one_stationary_spotlight.yaml"
-UAV = "specs/missions/uav_stim300.yaml"
+UAV = "tests/missions/uav_free_running.yaml"
 TIME, AZIMUTH = "collection.aperture_time", "platforms.receiver.azimuth"
 SENSOR = "platforms.receiver.motion_error.sensor.0"
 

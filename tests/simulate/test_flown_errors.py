@@ -7,11 +7,12 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy
+from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import path
 from bisar_budget.simulator.point import declared_errors
-from tests.conftest import ROOT, mission_text
+from tests.conftest import mission_file, mission_text
 
 
 def test_errors_stated_by_their_effects_have_these_effects_in_the_images() -> None:
@@ -29,19 +30,24 @@ def test_errors_stated_by_their_effects_have_these_effects_in_the_images() -> No
     assert 10 * math.log10(math.expm1(phase**2) / energy) == pytest.approx(10 * math.log10(2e-3), abs=0.01)
 
 
-def test_a_spectrum_is_flown_beside_errors_that_change_slowly() -> None:
-    """The example with a shaking airframe has an inertial sensor too; histories of two lengths were mixed."""
-    mission = load_mission(str(ROOT / "specs" / "missions" / "uav_vibrating_ocxo.yaml"))
+@pytest.mark.parametrize("beside", ["receiver.navigation", "receiver.random.GNSS"])
+def test_a_spectrum_is_flown_beside_errors_that_change_slowly(beside: str) -> None:
+    """A shaking airframe with an inertial sensor, aided or running free; histories of two lengths were mixed."""
+    mission = load_mission(str(mission_file("uav_vibrating_ocxo")))
+    if beside == "receiver.random.GNSS":
+        spectrum = "{100 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz, 2 kHz: 0.01 g^2/Hz}"
+        change = SetValue("platforms.receiver.motion_error.vibration.spectrum", spectrum)
+        mission = load_mission(str(mission_file("uav_free_running")), changes=[change])
     course = declared_errors(mission).receiver.course
     assert course is not None
     assert course.times.shape == course.values.shape[:1]
     sight = np.array(mission.platforms.receiver.state.look)
     fast = course.values @ sight - course.smooth(7).values @ sight
-    (error,) = (one for one in Analysis(mission).random if one.id == "receiver.vibration.spectrum")
-    rms = error.full.spread * error.declared * mission.radar.wavelength / (2 * np.pi)
-    noise = next(one for one in Analysis(mission).random if one.id == "receiver.random.GNSS")
-    beside = noise.full.spread * noise.declared * mission.radar.wavelength / (2 * np.pi)
-    assert np.std(fast) == pytest.approx(np.hypot(rms, beside), rel=0.25)  # one draw, and GNSS is slow
+    errors = {one.id: one for one in Analysis(mission).random}
+    flown = [errors[name] for name in ("receiver.vibration.spectrum", beside)]
+    phases = [one.full.spread * one.declared for one in flown]
+    rms = np.hypot(*phases) * mission.radar.wavelength / (2 * np.pi)
+    assert np.std(fast) == pytest.approx(rms, rel=0.25)  # one draw, and the error beside it is slow
 
 
 @pytest.mark.parametrize("height", [10.0, -3.0])
