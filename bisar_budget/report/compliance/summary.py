@@ -563,6 +563,14 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "velocity errors are as declared. Attitude errors and gyros turn the specific force, scale factor errors "
             "add a fraction of it",
         )
+    if any(platform.motion_error.navigation for platform in mission.platforms):
+        yield (
+            "Aided navigation",
+            "joint covariance of the position error over the aperture, in level axes without the rotation of the "
+            "Earth. The flight begins with errors of 10 m, 1 m/s, 1° of roll and pitch, and the stated heading; biases "
+            "begin at their figure and walk by √2 of it in 600 s. Beyond the aperture a platform without a log flies "
+            "straight on",
+        )
     if any(platform.motion_error.lever_arm for platform in mission.platforms):
         yield (
             "Lever arms",
@@ -586,6 +594,8 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "there are no free electrons; above, the leg crosses spherical shells at 7 km and 350 km",
         )
     for row in findings.rows:
+        if row.navigation is not None:
+            yield f"Navigation of the {row.owner}", "; ".join(row.remarks)
         if row.subject.facts.moves == "clock" and row.owner in Platforms._fields and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
