@@ -567,9 +567,9 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         yield (
             "Aided navigation",
             "joint covariance of the position error over the aperture, in level axes without the rotation of the "
-            "Earth. The flight begins with errors of 10 m, 1 m/s, 1° of roll and pitch, and the stated heading; biases "
-            "begin at their figure and walk by √2 of it in 600 s. Beyond the aperture a platform without a log flies "
-            "straight on",
+            "Earth. The flight begins with errors of 10 m, 1 m/s, 1° of roll and pitch, and the stated heading. "
+            "Biases begin at their figure, and walk by √2 of it in 600 s. Beyond the aperture a platform without a "
+            "log flies straight on",
         )
     if any(platform.motion_error.lever_arm for platform in mission.platforms):
         yield (
