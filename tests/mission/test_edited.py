@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
 CHANGES = [
     SetValue("platforms.receiver.motion_error.acceleration", "7 ug"),
-    SetValue("platforms.receiver.motion_error.imu.gyro_bias", "2 deg/h"),
+    SetValue("platforms.receiver.motion_error.lever_arm.uncertainty", "2 mm"),
     SetValue("platforms.transmitter.motion_error.acceleration", "5 ug"),
     SetValue("allocation.combine", "rss"),
     SetValue("allocation.split", "equal"),
