@@ -2,7 +2,7 @@
 
 The scene centre is the origin, and the ground is the plane z = 0; x is east, y north and z up. SI units, radians.
 Vectors are tuples of components, which are numbers for one case or arrays (cases,) for many. Functions of plain
-numbers return plain floats, which are ten times as fast as NumPy scalars.
+numbers return plain floats, because calculations with them are ten times as fast as with NumPy scalars.
 """
 
 import math
@@ -41,9 +41,9 @@ FRAME_AXES = {
 class UndefinedFrameError(ValueError):
     """The requested frame does not exist for a platform.
 
-    The frame `track` does not exist for a platform at rest. A platform directly above the scene centre has no cross
-    direction. The frame `ric` does not exist if the latitude and longitude of the scene are unknown, because the
-    position of the Earth's centre is then unknown as well.
+    The frame `track` does not exist for a platform at rest. The frame `look` does not exist for a platform directly
+    above the scene centre, because it has no cross direction there. The frame `ric` does not exist if the latitude
+    and longitude of the scene are unknown, because the position of the Earth's centre is then unknown as well.
     """
 
 
@@ -108,7 +108,7 @@ def unit(a: Vector) -> Vector: ...
 @overload
 def unit(a: Vectors) -> Vectors: ...
 def unit(a: Vectors) -> Vectors:
-    """Direction of a vector that is not zero."""
+    """Unit vector in the direction of a vector, which must not be zero."""
     length = norm(a)
     return (a[0] / length, a[1] / length, a[2] / length)
 
@@ -118,7 +118,10 @@ def without_rounding(a: Vector) -> Vector: ...
 @overload
 def without_rounding(a: Vectors) -> Vectors: ...
 def without_rounding(a: Vectors) -> Vectors:
-    """Set components to zero that are only rounding errors relative to the length, such as 6e-17 for cos 90°."""
+    """Replace components that are only rounding errors, such as 6e-17 for cos 90°, by zero.
+
+    A component counts as a rounding error if it is tiny relative to the length of the vector.
+    """
     floor = VECTOR_ROUNDING_FRACTION * norm(a)
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
@@ -390,7 +393,7 @@ class PlatformState:
 
     @cached_property
     def look_rate(self) -> Vectors:
-        """Rate of the unit vector u: v⊥/R with v⊥ = v − u(u·v). [1/s]"""
+        """Rate of change of the unit vector u: v⊥/R with v⊥ = v − u(u·v). [1/s]"""
         u, v, R = self.look, self.velocity, self.slant_range
         radial = dot(u, v)
         return (

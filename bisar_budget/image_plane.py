@@ -144,15 +144,15 @@ class GroundMatrix:
     Attributes
     ----------
     slopes : (2, nodes, cases)
-        Change of the range error at each node per metre of displacement east, and per metre north. [m/m]
+        Change of the range error at each node per metre of displacement to the east, and to the north. [m/m]
     fit : (4, nodes)
         Weights of `Sampling.fit`.
     band : (cases,)
         b² of the band.
     range_gradient : (2, cases)
-        Mean gradient of the range over the ground, east and north. [m/m]
+        Gradient of the range on the ground, east and north, averaged over the aperture. [m/m]
     covariance : (2, 2, cases)
-        Covariance of the gradient over the aperture.
+        Covariance of this gradient over the aperture.
     projection : (2, nodes, cases)
         Weights that give ⟨g, ρ⟩ from the range errors ρ at the nodes. ⟨ , ⟩ is the scalar product with ⟨ρ, ρ⟩ = V.
     xx, xy, yy : (cases,)
@@ -171,7 +171,7 @@ class GroundMatrix:
 
     @classmethod
     def of(cls, slopes: Floats, fit: Floats, band: Floats) -> "GroundMatrix":
-        """Compute H from `slopes`: the change of the range error at each node per metre east and per metre north.
+        """Compute H from `slopes`, the change of the range error at each node per metre to the east and to the north.
 
         `slopes` has the shape (2, nodes, cases). `fit` and `band` are fields of this class.
         """
@@ -287,7 +287,7 @@ def turn(determinant: Floats, orientation: Floats, centre: GroundMatrix, case: I
 def spans_ground(
     geometry: BistaticGeometry, radar: Band, aperture_time_s: PerCase, cases: int = 1
 ) -> tuple[Booleans, Floats]:
-    """Evaluate the two criteria for the existence of an image plane, (cases,) each.
+    """Evaluate the two criteria for the existence of an image plane; each result has the shape (cases,).
 
     The first criterion is whether the sum of the lines of sight turns within the aperture. The second is
     `GroundMatrix.sine`, the sine of the angle between the two ground directions in which bandwidth and aperture

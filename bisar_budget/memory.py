@@ -1,8 +1,9 @@
 """Memory limits of the process (`ulimit -v`, `ulimit -d`), checked before libraries allocate memory.
 
-A C library may end the process if it cannot allocate memory. OpenBLAS does so when NumPy is imported or first
-multiplies matrices, either with exit code 1 or with the signal of an interrupt; LLVM never returns. Python code
-cannot catch this. If the memory needed is known, it is therefore compared with the limit first.
+A C library may end the process if it cannot allocate memory. OpenBLAS does so when NumPy is imported or
+multiplies matrices for the first time; the process then ends with exit code 1 or with the signal of an interrupt.
+LLVM does not return at all. Python code cannot catch these failures. If the required memory is known, it is therefore
+compared with the limit before a library is used.
 """
 
 import errno
@@ -61,9 +62,9 @@ def is_spacious() -> bool:
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error, or one of its causes, is a lack of memory.
+    """Whether an error, or an error that caused it, shows that memory ran out.
 
-    If the memory use of the process came close to its limit, any error counts as a lack of memory.
+    If the memory use of the process came close to its limit, any error is attributed to a lack of memory.
     """
     return any(map(_says_memory, _causes(error))) or _is_near_limit()
 

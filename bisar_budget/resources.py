@@ -70,14 +70,20 @@ _held: FilesHeld | None = None  # None outside of a command: a caller of functio
 
 
 def hold_files() -> None:
-    """Begin a command: forget all contents of files, and keep the content of each file that is read from now on."""
+    """Begin to keep the content of each file that is read, for the duration of a command.
+
+    Contents that were kept for an earlier command are discarded.
+    """
     global _held
     FILES_READ.clear()
     _held = FilesHeld()
 
 
 def release_files() -> None:
-    """End a command. From now on, the current content of a file is read."""
+    """Discard the file contents kept for a command. This is called when the command ends.
+
+    Afterwards, each file is read with its current content.
+    """
     global _held
     _held = None
 
@@ -178,7 +184,7 @@ class Files(Protocol):
 
 
 class Disk:
-    """The current files on the disk. Within a command, each file has the content with which it was first read."""
+    """The files on the disk. While a command runs, each file keeps the content with which it was first read."""
 
     @staticmethod
     def content(file: str, most: int, called: str | None = None) -> bytes:

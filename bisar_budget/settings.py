@@ -39,7 +39,10 @@ class SettingsError(Exception):
 
 @dataclass(frozen=True)
 class Settings:
-    """Keys and values of the table `[tool.bisar-budget]`. `file` is the path of its file, for messages."""
+    """Keys and values of the table `[tool.bisar-budget]`.
+
+    `file` is the path of the file that contains the table; it is used in messages.
+    """
 
     file: str
     values: SettingValues

@@ -19,7 +19,7 @@ _MAX_QUANTITY_CHARACTERS = 64  # longer text is not a quantity
 
 
 class Dimension:
-    """Kind of quantity: its name with an article, the unit of a number without a unit, and all accepted units.
+    """Kind of quantity: its name with an article, the unit of a plain number, and all accepted units.
 
     `scales` maps each accepted unit to a factor and a divisor, one of which is 1. Division by a whole number keeps
     decimals exact: 5 mm is exactly the same number as 0.005 m. If every number needs a unit, `usual` names the usual
@@ -336,8 +336,8 @@ def given_unit(text: str, unit: str) -> str:
 def format_in(value: float, unit: str, written_unit: str, digits: int = 3, rounding: str = "nearest") -> str:
     """Write an SI value in `written_unit`, a unit of the same dimension as `unit`: 349 µrad becomes `0.02 deg`.
 
-    If `written_unit` is empty, or if the value is a level in dB, the value is written as by `format_quantity`.
-    Numbers of at least 1e6 or below 1e-4 are written with an exponent, such as `2e6`.
+    If `written_unit` is empty, or if the value is a level in dB, the text is the result of `format_quantity`. Numbers
+    of at least 1e6 or below 1e-4 are written with an exponent, such as `2e6`.
     """
     if not written_unit or unit == "dB" or not math.isfinite(value):
         return format_quantity(value, unit, digits, rounding)

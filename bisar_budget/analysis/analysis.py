@@ -175,7 +175,7 @@ class Analysis:
     def sources(self) -> list[ErrorSource]:
         """List the errors of a single-case analysis in the order of the rows in the report.
 
-        The results are single numbers instead of arrays.
+        The sizes and effects of the errors are single numbers instead of arrays.
         """
         return [error.in_one_case() for error in self.errors.listed]
 
@@ -220,7 +220,7 @@ class Case:
             self.random = [in_one_case(self.mission, error, place) for error in analysis.random]
 
     def number(self, column: PerCase | PerCaseFlag) -> float:
-        """Return the number of this case from an array (cases,), or from a single number that holds for all cases."""
+        """Return the value for this case from an array (cases,); a single number holds for all cases."""
         return plain(column, self.place)
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
@@ -241,7 +241,7 @@ class Case:
         return None
 
     def degeneracy(self, model: str) -> Note:
-        """Note on the reason why a model gives no displacements in this case.
+        """Return a note with the reason why a model gives no displacements in this case.
 
         The note is empty if the model gives displacements.
         """

@@ -1,14 +1,14 @@
 """Loss of the image peak due to all declared errors, for many cases at once.
 
-An error of motion or of a clock leaves a range error ρ over the aperture at the image point. The peak then keeps the
-fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over aperture and band, f₀ is the centre frequency, and
-k is the wavenumber at f₀. The mean over the aperture is computed as a sum over its nodes. With a random error whose
-phase has the variance σ², the peak keeps the fraction exp(-σ²) of its power. The same holds for a tone of unknown
-phase. The losses of independent errors, in decibels, are added, because the variances of their phases add (to second
-order).
+An error of motion or of a clock displaces the image of a point to the image point, and leaves a range error ρ over
+the aperture there. The peak then keeps the fraction |⟨exp(ikρf/f₀)⟩|² of its power, where ⟨ ⟩ is the mean over
+aperture and band, f₀ is the centre frequency, and k is the wavenumber at f₀. The mean over the aperture is computed
+as a sum over its nodes. With a random error whose phase has the variance σ², the peak keeps the fraction exp(-σ²) of
+its power. The same holds for a tone of unknown phase. The losses of independent errors, in decibels, are added,
+because the variances of their phases add (to second order).
 
-These relations are not in the paper; they are derived here. `tests/theory/test_image_point.py` checks them against
-images formed by direct sums.
+These relations are not from Rigling & Moses; they are derived here. `tests/theory/test_image_point.py` checks them
+against images formed by direct sums.
 """
 
 import math
@@ -34,9 +34,9 @@ def peak_loss_db(
 ) -> Floats:
     """Loss of the image peak due to all declared errors, (cases,). [dB]
 
-    The losses of single errors are combined by the mission's rule. Under root-sum-square the decibels are added.
-    Under `sum` the square roots of the decibels are added, and the result is squared. Under `each` the largest loss
-    is taken. The loss is NaN where an error leaves no image, or where no error is declared.
+    The losses due to single errors are combined according to `allocation.combine`. Under `rss` the decibels are
+    added. Under `sum` the square roots of the decibels are added, and the result is squared. Under `each` the largest
+    loss is taken. The loss is NaN where an error leaves no image, or where no error is declared.
 
     Parameters
     ----------

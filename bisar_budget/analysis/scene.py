@@ -13,9 +13,9 @@ is the phase that the edge adds to the phase at the centre. The rows of the repo
 also warns if the phase at the edge exceeds a limit that the phase at the centre meets. This limit includes the
 autofocus gain.
 
-In this module, a place is a ground point of the scene in one of the cases. The argument `of` of its functions holds
-the index of the case for each place. Along the axis "errors and parts", an array holds first the errors of motion and
-clocks. Then it holds the independent parts of which the random errors are composed (`scene_random`).
+In this module, a place is a ground point of the scene in one of the cases. An argument `of` holds the index of the
+case for each place. An array with the axis "errors and parts" holds first the errors of motion and clocks, and then
+the independent parts of which the random errors are composed (`scene_random`).
 """
 
 import math
@@ -128,7 +128,7 @@ class ScenePlaces:
 
     `phases` (errors and parts, places) [rad] are the quadratic phases of all errors and of the independent parts of
     which random errors are composed. `size` (places,) [rad] is the difference between the phases at the place and at
-    the centre, combined over all errors by the mission's rule.
+    the centre, combined over all errors according to the mission's rule (`allocation.combine`).
 
     A place has an image if its `clearance` (places,) exceeds 1. The bandwidth gives one direction of resolution, and
     the aperture gives a second direction. The clearance is the sine of the angle between these two directions,
@@ -148,9 +148,10 @@ class ScenePlaces:
 
     @property
     def heights(self) -> Floats:
-        """Values that the search along circles maximises, (2, places).
+        """Values whose maxima are searched for on circles around the scene centre, (2, places).
 
-        The first row is the negative of `clearance`, and the second row is `size`.
+        The first row is the negative of `clearance`, so its maximum is the smallest clearance. The second row is
+        `size`.
         """
         return np.array((-self.clearance, self.size))
 
@@ -306,7 +307,7 @@ class ScenePhases:
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
     def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Booleans) -> tuple[Floats, Floats, Floats]:
-        """Compute phase differences between ground points and the scene centre, and ratios that show lost images.
+        """Compute phase differences of ground points from the scene centre, and area ratios that show lost images.
 
         Returns three arrays. The first, (errors and parts, places), holds the first-order phase differences [rad].
         The second [rad], of the same shape, holds the same values, except that the differences of the errors marked
@@ -408,9 +409,9 @@ class ScenePhases:
 
         Each circle is evaluated at evenly spaced points and searched near the points with the largest differences.
         All circles must need the same number of evenly spaced points, see `points`. The difference grows as the
-        inverse of the clearance (see `ScenePlaces`). Near a small minimum of the clearance, it may therefore be
-        largest on a short arc between two of the points. For this reason the surroundings of such minima are searched
-        too.
+        inverse of the clearance (see `ScenePlaces`). Near a small minimum of the clearance, the largest difference
+        may therefore lie on a short arc between two of the points. For this reason the surroundings of such minima
+        are searched too.
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
@@ -555,9 +556,9 @@ class _Climb:
     def _bent(self) -> Booleans:
         """Mark the large errors whose exact phase differences on a circle deviate from the first-order differences.
 
-        The result is (errors and parts, circles), with the independent parts of which random errors are composed. An
-        error is large if its effects are not proportional to its size. The differences are compared at three
-        azimuths. These suffice to detect a deviation that consists of two harmonics of the azimuth.
+        The result is (errors and parts, circles). The parts are the independent parts of which random errors are
+        composed. An error is large if its effects are not proportional to its size. The differences are compared at
+        three azimuths, which suffice to detect a deviation that consists of two harmonics of the azimuth.
         """
         thirds = self.rims.azimuth + 2 * math.pi * np.arange(_SCENE.probe_count)[:, None] / _SCENE.probe_count
         radius, of, large = (
@@ -646,8 +647,8 @@ class SceneEdges:
 
     `rim` holds the largest phase difference from the centre [rad] and the azimuth [rad] where it occurs, computed as
     if all errors were small. `largest` holds the same two quantities, computed for the declared sizes of the errors.
-    In both, the errors are combined by the mission's rule. The differences are infinite if a part of the edge has no
-    image.
+    In both, the errors are combined according to the mission's rule (`allocation.combine`). The differences are
+    infinite if a part of the edge has no image.
 
     `names` are the ids of the errors, or of the sums of errors, that are judged at the edge. `limit` (names, cases)
     [rad] is the limit of their phases. `over` (names, cases) [rad] is the phase at the edge if it exceeds the limit
@@ -956,8 +957,8 @@ class SceneEdge(NamedTuple):
     """Largest change of the quadratic phase from the centre to the edge of a mission's scene.
 
     `radius` [m] is the radius of the edge. `difference` [rad] is the largest change of the phase, combined over all
-    errors by the mission's rule. It occurs at `azimuth` [rad] on the edge. `difference` is NaN if a part of the edge
-    has no image, and `degeneracy` then gives the reason.
+    errors according to the mission's rule (`allocation.combine`). It occurs at `azimuth` [rad] on the edge.
+    `difference` is NaN if a part of the edge has no image, and `degeneracy` then gives the reason.
 
     Up to `autofocus_radius` [m] the change stays within the total budget. This radius is None if the change stays
     within the budget up to `searched` [m], the largest radius that was examined. `doubt` names an error or a sum of
@@ -999,7 +1000,7 @@ class SceneEdge(NamedTuple):
         return cls(radius, difference, azimuth, within, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
-        """Notes on the azimuth of the largest change and on the radius that one autofocus correction covers.
+        """Return notes on the azimuth of the largest change and on the radius that one autofocus correction covers.
 
         `total` [rad] is the total budget of the quadratic phase. If there is no change, a single note states this.
         """

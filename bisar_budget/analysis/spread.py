@@ -7,8 +7,8 @@ sidelobes.
 
 Noise with the phase variance σ² leaves the fraction exp(-σ²) of the energy in the impulse response, and spreads the
 remaining energy over the image. In an image, the mainlobe is taken to extend to the first nulls of the response. It
-contains the fraction E of the response's energy. Noise therefore adds (exp(σ²) - 1)/E to the ISLR. The paper's rule
-adds σ² instead.
+contains the fraction E of the response's energy. Noise therefore adds (exp(σ²) - 1)/E to the ISLR. The rule of
+Rigling & Moses adds σ² instead.
 """
 
 import math
@@ -171,7 +171,7 @@ def tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[To
 
 
 def _echoes(alone: Tone, free: PerCase, remaining: LeftTone, mission: Mission) -> list[Tone]:
-    """List the tones with echoes that remain after synchronization has acted on a tone of an oscillator.
+    """List the tones that remain of an oscillator's tone after synchronization, as sources of paired echoes.
 
     `alone` represents the result of synchronization as a single tone. If synchronization does not fold the
     oscillator's tone to other frequencies, the list contains only `alone`. If synchronization folds it to several

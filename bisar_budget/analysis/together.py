@@ -86,7 +86,8 @@ class Together:
     def rule_of_all(self) -> str:
         """Rule for combinations that must include all declared errors.
 
-        It is the mission's rule. If that rule is `each`, which combines no errors, it is `rss`, the root-sum-square.
+        The mission's rule is used, unless it is `each`, which combines no errors. In that case the rule is `rss`, the
+        root-sum-square.
         """
         return "rss" if self.rule == "each" else self.rule
 
@@ -217,7 +218,7 @@ class Together:
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 
     def moves(self, rule: str) -> Moves:
-        """List the displacements of the image due to errors of motion, in the form that a rule combines. [m]
+        """List the displacements of the image due to errors of motion, in the form in which a rule combines them. [m]
 
         Each item is a pair of row id and (east, north). For all rules except `sum`, the displacement is given for the
         sign of the error that moves the image farther.
@@ -278,7 +279,7 @@ class Together:
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
         """List the signed phases that a rule combines in one case, as floats. [rad]
 
-        Each item is a pair of id and phase. If `rule` is empty, it is the mission's rule. Under root-sum-square the
+        Each item is a pair of id and phase. If `rule` is empty, the mission's rule is used. Under root-sum-square the
         six phases of a covariance are combined to a single item.
         """
         combined_parts = phase_parts(phases, rule or self.rule, self.groups)

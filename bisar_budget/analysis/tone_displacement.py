@@ -2,10 +2,10 @@
 
 Over an aperture of duration T, a tone of frequency f and amplitude A has the mean A·j₀(x), with x = πfT. Its linear
 part is 3A·j₁(x) at the aperture edge. These parts of the range error displace the image. In the published model the
-displacement follows from equation (25) of the paper. In the full model the line of sight turns. The displacement then
-follows from exact ranges, and from the Legendre terms of order 0 to 3 of the tone. Terms 0 and 2 are largest at the
-same phase of the tone, and terms 1 and 3 are largest a quarter cycle later. The image therefore moves on an ellipse
-as the phase of the tone varies.
+displacement follows from equation (25) of Rigling & Moses. In the full model the line of sight turns, and the
+displacement follows from exact ranges and from the Legendre terms of order 0 to 3 of the tone. Terms 0 and 2 are
+largest at the same phase of the tone, and terms 1 and 3 are largest a quarter cycle later. The image therefore moves
+on an ellipse as the phase of the tone varies.
 
 The east and the north component are each taken at the phase at which they are largest. Their root-sum-square is √2
 times the rms displacement over all phases. It lies between the largest displacement and √2 times the largest
@@ -51,7 +51,10 @@ class TonePart(NamedTuple):
 
     @property
     def displacement(self) -> Floats:
-        """Displacement of the image, each component (east, north) at its worst phase, (2, n). [m]"""
+        """Displacement of the image (east, north), (2, n). [m]
+
+        Each component is given for the phase of the tone at which it is largest.
+        """
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
         return np.asarray(np.hypot(constant - quadratic, linear - cubic))
 

@@ -1,10 +1,10 @@
 """Limits of vibration: the largest motion of a platform along the line of sight that meets the requirements.
 
-The limits follow from the paper's rule, and separately from first principles. A motion of amplitude A along the line
-of sight causes a phase with the peak φ = 2πA/λ. A sinusoidal motion makes paired echoes. Their amplitude relative to
-the impulse response is J₁(φ)/J₀(φ), about φ/2. Gaussian noise with the rms phase σ leaves the fraction exp(-σ²) of
-the power in the response and spreads the remaining power. An image then shows an ISLR of (exp(σ²) - 1)/E, see
-`spread`. These relations are derived here. They were checked against the Fourier transform of an error-affected
+Each limit is computed twice: by the rule of Rigling & Moses, and from first principles. A motion of amplitude A along
+the line of sight causes a phase with the peak φ = 2πA/λ. A sinusoidal motion makes paired echoes. Their amplitude
+relative to the impulse response is J₁(φ)/J₀(φ), about φ/2. Gaussian noise with the rms phase σ leaves the fraction
+exp(-σ²) of the power in the response and spreads the remaining power. An image then shows an ISLR of (exp(σ²) - 1)/E,
+see `spread`. These relations are derived here. They were checked against the Fourier transform of an error-affected
 aperture phase.
 
 The requirement is divided between the platforms so that both together meet it if each stays within its share. If both
@@ -12,10 +12,10 @@ vibrate at the same frequency, the amplitudes of their echoes add in the worst p
 therefore divided, in the ratio of the square roots of the platforms' shares of the allowed power. The noise of the
 two platforms is independent, so its variances add, and the allowed power itself is divided.
 
-The paper's rule is φ² ≤ PSLR·share and σ² ≤ ISLR·share. At equal shares, its limit for sinusoids is 3 dB below the
-limit from first principles. Its limit for noise exceeds the limit from first principles by the factor 1/E, which is
-0.44 dB with a uniform window. If the noise were identical on both platforms instead of independent, the ISLR would be
-3 dB higher.
+The rule of Rigling & Moses is φ² ≤ PSLR·share and σ² ≤ ISLR·share. At equal shares, its limit for sinusoids is 3 dB
+below the limit from first principles. Its limit for noise exceeds the limit from first principles by the factor 1/E,
+which is 0.44 dB with a uniform window. If the noise were identical on both platforms instead of independent, the ISLR
+would be 3 dB higher.
 
 A vibration between one and three cycles per aperture counts as a vibration that makes echoes, although it also causes
 a quadratic phase. A slower vibration makes no echoes, see `effects.vibration`.
@@ -91,11 +91,12 @@ def bessel(phase: PerCase) -> tuple[PerCase, PerCase]:
 
 
 class Echo(NamedTuple):
-    """Paired echo of a single tone, or of several tones with neighbouring frequencies and the worst phases.
+    """Paired echo of a single tone, or of several tones with neighbouring frequencies in their worst phases.
 
-    `phase` [rad] is the peak phase of a single tone that would make an equally high echo. `cycles` is the number of
-    cycles per aperture, which is also the distance of the echo from the main response in resolution cells. `level` is
-    the amplitude of the echo relative to the main response. `is_of` (tones, ...) marks the tones that make the echo.
+    `phase` [rad] is the peak phase of a single tone that would make an echo of the same height. `cycles` is the
+    number of cycles per aperture, which is also the distance of the echo from the main response in resolution cells.
+    `level` is the amplitude of the echo relative to the main response. `is_of` (tones, ...) marks the tones that make
+    the echo.
     """
 
     phase: Any

@@ -1,7 +1,7 @@
 """Budget rows that judge sums of errors.
 
-They limit the quadratic and cubic phase, the displacement of the image, the total phase that autofocus can pull in,
-and the phase differences at the edge of the scene.
+They limit the quadratic and cubic phase, the displacement of the image, the total phase that autofocus must correct,
+and the difference between the phases at the edge and at the centre of the scene.
 """
 
 import math
@@ -187,11 +187,11 @@ class Aggregates:
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
 
-        A declared sum without a finite value fails, because one of its errors is so large that no image of the point
-        forms. If the argument `without_value` is given, it is the status of such a sum instead of `fail`. `continued`
-        is a pair: the kind of effect that the row sums, and the random errors in the sum. A pass becomes a warning if
-        it depends on phase noise at frequencies below the first point of a phase-noise mask. A pass that depends on
-        doubtful oscillator noise becomes `not_evaluated`.
+        A sum of declared errors that has no finite value gets the status `fail`, because one of the errors is so
+        large that no image of the point forms. If `without_value` is given, the sum gets this status instead.
+        `continued` is a pair: the kind of effect that the row sums, and the random errors in the sum. A pass becomes
+        a warning if it depends on phase noise at frequencies below the first point of a phase-noise mask. A pass that
+        depends on doubtful oscillator noise becomes `not_evaluated`.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -505,7 +505,7 @@ def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit:
 class JudgedScene:
     """Difference between the phase errors at the edge and at the centre of the scene, for an array of cases.
 
-    `edges` is None if no error is declared.
+    `edges` holds the phase changes from the centres to the edges of the scenes. It is None if no error is declared.
     """
 
     analysis: Analysis
@@ -550,7 +550,8 @@ class JudgedScene:
 class SceneRow(FamilyRow):
     """The row that judges the phase error at the edge of the scene relative to the centre, for an array of cases.
 
-    `is_over_full` marks the cases that the published model gates and that fail under the full model.
+    `is_over_full` marks the cases in which the published model judges the row, but the phase difference exceeds the
+    budget in the full model.
     """
 
     scene: JudgedScene

@@ -102,7 +102,10 @@ def _vibrates(platform: Platform) -> PerCaseFlag:
 
 # ---------------------------------------------------------------------- the table of kinds
 def _whole(mission: Mission, name: str) -> str:
-    """Return an empty string, because the kind of error needs only a single entry, which the file has."""
+    """Return an empty string, which means that no entry is missing.
+
+    This kind of error needs only a single entry, and the file has it.
+    """
     return ""
 
 
@@ -114,7 +117,10 @@ _SECTIONS_OF_OTHER_WORDS = {
 
 
 def _key(word: str, owner: str) -> str:
-    """Path of the key or section of the mission file that states the errors of a word of `requirements.declare`."""
+    """Path of the key or section of the mission file that states a kind of error.
+
+    `word` names the kind in `requirements.declare`.
+    """
     if word in _SECTIONS_OF_OTHER_WORDS:
         return _SECTIONS_OF_OTHER_WORDS[word].format(owner=owner)
     kind = kind_of(word)
@@ -123,22 +129,23 @@ def _key(word: str, owner: str) -> str:
 
 
 def _states(mission: Mission, key: str) -> bool:
-    """Whether a mission states the value, the list or the section at a path; an empty one does not count."""
+    """Whether a mission states a value, or a list or section that is not empty, at the path `key`."""
     value = value_at(mission, key)
     return value is not None and (not isinstance(value, tuple) or bool(value)) and getattr(value, "is_stated", True)
 
 
 @dataclass(frozen=True)
 class _OfPlatform:
-    """A kind of error that each platform can have, with tests of the mission file.
+    """A kind of error that each platform can have, and functions that examine a mission file for this kind.
 
-    `lacks` names a missing key without which the stated error has no effect; the result is empty if nothing is
-    missing. If `needs_both` is set, an error for which `lacks` finds a missing key is not declared.
+    `lacks` returns the name of a missing key without which the stated error has no effect. The name is empty if
+    nothing is missing. If `needs_both` is true, the kind does not count as declared while such a key is missing.
 
-    If `is_owed` is not set, the kind counts as missing only if the file states a part of it. For a platform that does
-    not move, only the kinds with `is_owed_still` are required. A kind without `is_listed` counts as other kinds, for
-    example a covariance as position and velocity. Kinds with `is_clock` are not needed if there is a direct path.
-    Kinds with `is_in_navigation` are part of an aided navigation, which declares them.
+    If `is_owed` is false, a file need not declare the kind, and the kind counts as missing only if the file states a
+    part of it. For a platform that does not move, only kinds with a true `is_owed_still` are required. If `is_listed`
+    is false, an error of this kind counts as an error of different kinds, for example a covariance as position and
+    velocity. If `is_clock` is true, the kind is not needed with a direct path. If `is_in_navigation` is true, the
+    kind is part of an aided navigation, and a file with an aided navigation need not declare it separately.
     """
 
     has_source: Callable[[Platform], bool]
@@ -209,7 +216,7 @@ def _of_platforms() -> Mapping[str, _OfPlatform]:
 
 @dataclass(frozen=True)
 class _OfMission:
-    """A kind of error that belongs to no single platform, with tests of the mission file.
+    """A kind of error that belongs to no single platform, and functions that examine a mission file for this kind.
 
     Such errors are errors of the clocks and of the atmosphere, errors that both platforms have in common, and errors
     with other causes.
@@ -384,8 +391,9 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
     - an inertial sensor: any of its figures;
     - the atmosphere: the delays of each leg.
 
-    For a platform that does not move, only the position is required, and the oscillator if the requirement names the
-    platform. An error that both platforms have in common does not count as a declaration for either platform alone.
+    For a platform that does not move, only the position is required. The oscillator is required too if an entry of
+    `requirements.declare` names the platform. An error that both platforms have in common does not count as a
+    declaration for either platform alone.
 
     Parameters
     ----------
@@ -404,8 +412,8 @@ def missing_declarations(mission: Mission, still: Container[str] | None = None) 
 def groups_alike(mission: Mission, geometry: BistaticGeometry, cases: int) -> Iterator[Booleans]:
     """Yield masks (cases,) of groups of cases that lack the same required errors.
 
-    The cases of a group agree in which platforms move and vibrate, and in which entries have no effect. There is
-    nearly always one group.
+    In all cases of a group, the same platforms move, the same platforms vibrate, and the same entries have no effect.
+    Nearly always, there is only one group.
     """
     flags: list[PerCaseFlag] = []
     for name, path in zip(PLATFORMS, geometry.both, strict=True):

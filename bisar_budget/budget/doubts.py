@@ -134,9 +134,9 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, StateKind
 def strays(mission: Mission, name: str) -> PerCaseFlag:
     """Whether a platform's true path may differ from its given path by more than the declared position error.
 
-    The result is a Boolean or an array (cases,). If no position error is declared, the result is true in two cases:
-    if the age of the orbital elements, the interpolation of the ephemeris or the residual of the log is unusual, and
-    if the possible difference would use more than a negligible part of a requirement.
+    The result is a Boolean or an array (cases,). If no position error is declared, one of two further conditions must
+    hold. Either the age of the orbital elements, the interpolation of the ephemeris or the residual of the log is
+    unusual, or the possible difference would use more than a negligible part of a requirement.
     """
     platform: Platform = getattr(mission.platforms, name)
     path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -162,7 +162,7 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, state: StateKind | None = POSITION_KIND) -> bool:
-    """Whether a row depends on a path error of the platform `owner` that is in doubt.
+    """Whether a row depends on a doubtful path error of the platform `owner`.
 
     `state` is the kind of the path error. The row must refer to the frame in which the file states the error. If
     `state` is None, the error is the residual of a log, which spreads power over the image. The rows that depend on
@@ -233,7 +233,7 @@ def _stated_covariance(stated: StatedAccuracy, state: StateKind, platform: Platf
 def _declared_covariance(platform: Platform, state: StateKind) -> Floats:
     """Covariance (..., 3, 3) of the declared errors of one kind, along the scene's axes.
 
-    `state` is the kind of the errors: position, with the covariance in [m²], or velocity, in [m²/s²].
+    `state` is the kind of the errors: position errors [m²] or velocity errors [m²/s²].
     """
     error = platform.motion_error
     sizes = error.stated(state.name) or (0.0, 0.0, 0.0)

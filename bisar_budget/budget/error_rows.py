@@ -224,7 +224,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
 
 def _cause(source: ErrorSource) -> Note:
-    """Write a note that names the effect of an error which the full model includes and the published model omits."""
+    """Write a note on the effect that only the full model includes for this error."""
     if source.kind.direction:  # terrain
         return phrases.note("wrong-height-defocuses")
     if source.kind.order == 0:

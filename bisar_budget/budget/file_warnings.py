@@ -104,9 +104,10 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
 
 
 def _of_own_ids(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
-    """Yield warnings about requirement ids without a row, and about wordings of requirements without a known id.
+    """Yield warnings about ids in the mission file that refer to nothing.
 
-    The ids and wordings are stated in the mission file.
+    These are row ids in `requirement_ids` for which there is no row or requirement, and ids in `requirement_texts`
+    that `requirement_ids` does not contain.
     """
     if mission.requirement_ids:
         ids = [row.id for row in rows] + [id_of_requirement(key) for key in required_keys(mission)]

@@ -1,4 +1,4 @@
-"""Changes of the allowables due to the noise of a log of positions to which a platform's path is fitted.
+"""Changes of the allowables due to noise in the position log to which a platform's path is fitted.
 
 The allowable of a position or velocity error depends on how the line of sight to the platform rotates. A path fitted
 to a noisy log has an error at each time of the aperture, and therefore each allowable has an error too. The error of

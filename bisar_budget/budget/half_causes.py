@@ -30,7 +30,7 @@ class HalfCause:
     requirements : tuple of str
         Keys of the requirements that limit the effects of the cause.
     note : Note
-        Note that names the key to add to the file.
+        Message with the name of the key to add to the file.
     """
 
     platforms: tuple[str, ...]

@@ -59,8 +59,8 @@ class JudgedMission:
 
     `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers. The
     field `why` of a row gives the reason for its status if the numbers of the row do not decide it. `families` holds
-    the rows of each gating model, before the rows of both models are merged. `doubts` marks the cases with each kind
-    of doubt about the mission, by the code of the warning.
+    the rows of each gating model, before the rows of both models are merged. `doubts` maps the code of each warning
+    that casts doubt on the mission to a mask of the cases with this doubt.
     """
 
     analysis: Analysis
@@ -263,7 +263,7 @@ def _undeclared(
 ) -> Iterator[Judged]:
     """Yield rows for errors that are not declared in any case.
 
-    There are two kinds of such rows: rows that are always shown, and rows of path errors on platforms whose path may
+    There are two kinds of such rows: rows that are always shown, and rows of path errors of platforms whose path may
     be less accurate than declared. `in_doubt` marks the cases with such a path, for each platform and kind of error.
     """
     subjects = dict(analysis.shown or {})
@@ -311,7 +311,7 @@ def _doubted_rows(analysis: Analysis, rows: Sequence[Judged]) -> Booleans:
 def _floor(analysis: Analysis, doubts: Mapping[str, Booleans]) -> Codes:
     """Return the best status that each case can have, (cases,).
 
-    It is `not_evaluated` if no error is declared, and `warn` with a doubt about the mission. Otherwise it is `pass`.
+    It is `not_evaluated` if no error is declared, and `warn` if the mission is doubtful. Otherwise it is `pass`.
     """
     is_random = any(error.declared is not None for error in analysis.random)
     if not (analysis.errors.stated or _vibrates(analysis.mission) or is_random):

@@ -80,8 +80,8 @@ class Why(IntEnum):
 class Judged(NamedTuple):
     """One row of the budget for an array of cases: its status codes (indices in `STATUS`) and its numbers, (cases,).
 
-    A number is NaN in the cases for which it is not defined. The numbers from `allowable_published` on are computed
-    only if `Judging.is_complete` is set.
+    A number is NaN in the cases for which it is not defined. The numbers in `COMPLETE_FIELDS` are computed only if
+    `Judging.is_complete` is set.
     """
 
     subject: Subject

@@ -44,8 +44,8 @@ class UnsaidResidual(FamilyRow):
     """The row for the residual of a log, for an array of cases.
 
     The residual is the difference between the position fixes of the log and the smooth path fitted to them. The row
-    is not evaluated. The reason in the report is the note on the doubt whether the processor uses the fixes or the
-    smooth path.
+    is not evaluated. The report gives the reason: it is unknown whether the processor uses the fixes or the smooth
+    path.
     """
 
     def in_words(self, case: Case, model: str) -> Row:

@@ -1,7 +1,8 @@
 """Doubts about the checked mission itself, which set its status to at least `warn`.
 
-Each kind of doubt has the code of the warning that `check` gives for it. The conditions hold for a single case and
-for an array of cases, so that a case of a sweep has the status of a check with the same values.
+Each kind of doubt is identified by the code of the warning that `check` gives for it. The functions work for a single
+case and for an array of cases. A case of a sweep therefore gets the same status as a check of a mission with the same
+values.
 """
 
 import math
@@ -45,10 +46,11 @@ def flies_straight(mission: Mission, name: str, path: PlatformState) -> PerCaseF
 
 
 def does_not_fall(mission: Mission, name: str, path: PlatformState) -> PerCaseFlag:
-    """Whether errors on any other path above 100 km are judged without the orbital dynamics that may matter.
+    """Whether omitted orbital dynamics may affect the errors on a path above 100 km that is not in free fall.
 
-    The result is a Boolean or an array (cases,). The dynamics matter if they may change a phase noticeably. They also
-    matter if errors are stated in `ric`, because their velocities are then not inertial.
+    The result is a Boolean or an array (cases,). It is false for a path to which `flies_straight` applies. The
+    dynamics matter if they may change a phase noticeably. They also matter if the errors are stated in the frame
+    `ric`, because the velocity errors are then not inertial.
     """
     is_high = _is_high(mission, path) & ~_falls(path)
     if not np.any(is_high):
@@ -61,9 +63,10 @@ def does_not_fall(mission: Mission, name: str, path: PlatformState) -> PerCaseFl
 def missing_phase_rad(mission: Mission, name: str, path: PlatformState) -> PerCase:
     """Upper bound on the quadratic phase that orbital dynamics add to the declared errors of a platform. [rad]
 
-    Derived here. Relative to p + vτ, the gradient of gravity and the rotation of the Earth accelerate an error by at
-    most (2μ/r³ + ω²)|δr| + 2ω|δv|, where r is the distance from the Earth's centre. A constant acceleration a over an
-    aperture time T causes the quadratic phase 2π/λ·aT²/8.
+    A position error δr and a velocity error δv change the position by δr + δv·τ at slow time τ. The gradient of
+    gravity and the rotation of the Earth add an acceleration of at most (2μ/r³ + ω²)|δr| + 2ω|δv|, where μ is the
+    gravitational parameter of the Earth, ω is its rotation rate, and r is the distance from its centre. A constant
+    acceleration a over an aperture time T causes the quadratic phase 2π/λ·aT²/8. The bound is derived here.
     """
     from bisar_budget.paths.earth import ROTATION_RATE_RAD_PER_S  # takes 8 ms; most missions have no satellite
     from bisar_budget.paths.free_fall import departure_of
@@ -133,10 +136,10 @@ def has_idle_arm(mission: Mission, name: str, path: PlatformState) -> PerCaseFla
 
 
 def has_calm_oscillator(mission: Mission, name: str, path: PlatformState) -> PerCaseFlag:
-    """Whether an oscillator is sensitive to acceleration, but neither vibrates nor rotates.
+    """Whether the file states an oscillator's sensitivity to acceleration, but no vibration or turn that acts on it.
 
-    The file must state the sensitivity; one of a part of the catalogue is no doubt. The result is a Boolean or an
-    array (cases,).
+    A sensitivity that comes from a part of the catalogue causes no doubt. The result is a Boolean or an array
+    (cases,).
     """
     oscillator = getattr(mission.platforms, name).oscillator
     return oscillator is not None and oscillator.states_sensitivity and is_unshaken(mission, name)
@@ -152,7 +155,10 @@ MISSION_DOUBTS: Mapping[str, Callable[[Mission, str, PlatformState], PerCaseFlag
 
 
 def mission_doubts(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, Booleans]:
-    """Find the cases with each kind of doubt about any of the platforms, as masks (cases,) by code of the warning."""
+    """Find the cases with each kind of doubt about at least one of the platforms.
+
+    The result maps the code of each warning to a mask of the cases, (cases,).
+    """
     masks = {}
     for code, is_doubted in MISSION_DOUBTS.items():
         of_platforms = [

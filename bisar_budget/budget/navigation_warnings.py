@@ -1,6 +1,8 @@
-"""Warnings about navigations: inertial units that run free beside a GNSS receiver, and errors that contradict.
+"""Warnings about the navigation of platforms.
 
-A warning is a sentence and the key to which it refers.
+They concern aided navigations whose fixes do not determine the errors, inertial units that are not aided by the GNSS
+receiver of their platform, and position errors that contradict the velocity errors. A warning consists of a sentence
+and the key of the mission file to which it refers.
 """
 
 import math
@@ -13,7 +15,7 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.random_effect import RandomError, SensorCases
-from bisar_budget.error_kinds.path_kinds import POSITION_KIND
+from bisar_budget.error_kinds.path_kinds import POSITION_KIND, VELOCITY_KIND
 from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
 from bisar_budget.faults import KeyPath
 from bisar_budget.mission.model import Mission
@@ -27,7 +29,7 @@ _CONVERGED_FRACTION = 0.3  # of an error at the start; with more at mid-aperture
 
 
 def navigation_warnings(case: Case) -> Iterator[tuple[KeyPath, Note]]:
-    """Yield the warnings about the navigations of both platforms, with the keys to which they refer."""
+    """Yield the warnings about the navigation of both platforms, as pairs of key and note."""
     mission = case.mission
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
@@ -42,11 +44,11 @@ def navigation_warnings(case: Case) -> Iterator[tuple[KeyPath, Note]]:
             )
         elif error.imu is not None and any(figure.key == fixes for figure in mission.taken):
             yield (*key, "sensor"), _of_free_running(mission, name, case.random)
-        yield from _contradiction(mission, name, error)
+    yield from _contradictions(mission)
 
 
 def _of_aided(mission: Mission, navigation: Navigation, error: RandomError) -> Iterator[Note]:
-    """Yield a warning if an aided navigation has no fix, or rests on the assumed errors at its start."""
+    """Yield a warning if an aided navigation has no fix, or if too much of an error assumed at its start remains."""
     half, errors = mission.collection.aperture_time / 2, error.navigation
     assert errors is not None
     if not errors.has_fixes:
@@ -59,7 +61,10 @@ def _of_aided(mission: Mission, navigation: Navigation, error: RandomError) -> I
 
 
 def _of_free_running(mission: Mission, name: str, errors: Sequence[RandomError]) -> Note:
-    """Warning about an inertial unit that runs free beside a GNSS receiver, with the phases of both readings."""
+    """Warn that an inertial unit is not aided although its platform has a GNSS receiver.
+
+    The note gives the quadratic phase of the unaided unit, and also the phase with aiding if it can be computed.
+    """
     phases = [
         error.full.quadratic * (error.declared or 0.0)
         for error in errors
@@ -73,7 +78,7 @@ def _of_free_running(mission: Mission, name: str, errors: Sequence[RandomError])
 
 
 def _phase_if_aided(mission: Mission, name: str) -> float | None:
-    """Quadratic phase if the receiver aided the inertial unit [rad]; None if the unit lacks a figure."""
+    """Quadratic phase [rad] if the GNSS receiver aided the inertial unit; None if a needed figure is missing."""
     platform: Platform = getattr(mission.platforms, name)
     imu, error = platform.motion_error.imu, platform.motion_error
     if any(getattr(imu, figure) is None for figure in NEEDED_IMU_FIGURES) or not np.all(error.position):
@@ -89,29 +94,30 @@ def _phase_if_aided(mission: Mission, name: str) -> float | None:
     return float(np.ravel(random_error.full.quadratic * random_error.declared)[0])
 
 
-def _contradiction(mission: Mission, name: str, error: MotionError) -> Iterator[tuple[KeyPath, Note]]:
+def _contradictions(mission: Mission) -> Iterator[tuple[KeyPath, Note]]:
     """Yield a warning if the sigmas of position and velocity cannot both hold over the whole aperture.
 
-    A position error that is small at every moment leaves no room for the way of a large velocity error.
+    A position error that is small at every moment leaves no room for the way of a large velocity error. One warning
+    names all platforms, with the figures of the worst.
     """
     half = mission.collection.aperture_time / 2
-    if error.distribution != "normal" or error.position is None or error.velocity is None:
-        return
-    ways = [
-        (abs(velocity) * half / abs(position), position, velocity)
-        for position, velocity in zip(error.position, error.velocity, strict=True)
-        if position
-    ]
-    ratio, position, velocity = max(ways, default=(0.0, 0.0, 0.0))
-    if ratio > _CONTRADICTION_RATIO:
-        yield (
-            ("platforms", name, "motion_error", "velocity"),
-            phrases.note(
-                "position-and-velocity-contradict",
-                platform=name,
-                position=abs(position),
-                velocity=abs(velocity),
-                way=abs(velocity) * half,
-                half=half,
-            ),
+    worst = {}
+    for name in PLATFORMS:
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        if error.distribution != "normal" or error.position is None or error.velocity is None:
+            continue
+        ways = [
+            (abs(velocity) * half / abs(position), abs(position), abs(velocity))
+            for position, velocity in zip(error.position, error.velocity, strict=True)
+            if position
+        ]
+        if max(ways, default=(0.0,))[0] > _CONTRADICTION_RATIO:
+            worst[name] = max(ways)
+    if worst:
+        _, position, velocity = max(worst.values())
+        key = VELOCITY_KIND.section(next(iter(worst)))
+        platforms, way = list(worst), velocity * half
+        note = phrases.note(
+            "position-and-velocity-contradict", platforms=platforms, position=position, velocity=velocity, way=way
         )
+        yield key, note

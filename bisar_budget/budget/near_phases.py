@@ -25,9 +25,9 @@ from bisar_budget.phrases import NOTHING, Note
 class NearPhases(NamedTuple):
     """Phase errors [rad] that a slow tone causes at its worst starting phase, and their utilizations, (cases,).
 
-    `use` is the larger utilization of the limits on the quadratic and the cubic phase, and `quadratic_use` is the
-    utilization of the limit on the quadratic phase. These values are NaN for a tone that is too fast to cause such
-    phase errors. `without_autofocus` is the utilization of the limit on the quadratic phase without the autofocus
+    `quadratic_use` is the utilization of the limit on the quadratic phase. `use` is the larger of this utilization
+    and the utilization of the limit on the cubic phase. Both are NaN for a tone that is too fast to cause such phase
+    errors. `without_autofocus` is the utilization of the limit on the quadratic phase without the autofocus
     gain; it is 0 for a tone that is too fast.
     """
 
@@ -49,9 +49,9 @@ class NearPhases(NamedTuple):
     ) -> "NearPhases":
         """Compute the utilizations of a tone from the phase errors that it causes.
 
-        `owner` is the platform of the tone. `phases` [rad] are its quadratic phase, its cubic phase, the quadratic
-        phase that would cause the same peak loss, and the judged phase, which is compared with the limit. `is_near`
-        marks the cases in which the tone is slow enough to cause these phase errors.
+        `owner` is the platform of the tone. `phases` [rad] are the quadratic phase of the tone, its cubic phase, the
+        quadratic phase that would lower the peak as much as the tone does, and the judged phase, which is compared
+        with the limit. `is_near` marks the cases in which the tone is slow enough to cause these phase errors.
         """
         quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
         use = quadratic_use = judged / allocation.qpe_allowed(owner)

@@ -222,7 +222,7 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Booleans:
-        """Mark the errors that depend on phase noise at frequencies below a phase-noise mask, (errors, cases).
+        """Mark the errors that depend on phase noise at frequencies below the first point of a mask, (errors, cases).
 
         `effects` are the effects per unit of each error. `sizes` are the sizes at which the errors reach their
         limits, (requirements, errors, cases).
@@ -391,7 +391,8 @@ class IslrRow(FamilyRow):
 
     `variance` is the variance of the total phase [rad²]. `limit` is the rms phase [rad] that the gating model allows,
     and `limit_of_other` is the rms phase [rad] that the other model allows. `is_over_other` marks the cases that fail
-    under the other model, and `rests_on_masks` those that rest on noise beyond the points of a mask.
+    in the other model. `rests_on_masks` marks the cases that depend on phase noise at frequencies below the first
+    point of a phase-noise mask.
     """
 
     members: Sequence[SpreadPhase]
@@ -696,7 +697,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
-    """Write a note that an oscillator's effect depends on noise at frequencies below its phase-noise mask.
+    """Write a note that an oscillator's effect depends on noise at frequencies below the first point of its mask.
 
     Several kinds of effect may depend on this noise. The note describes the kind to which the noise contributes the
     largest fraction. It is empty if no kind depends on the noise.

@@ -68,7 +68,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 def _declarations(case: Case, judged_row: Judged) -> Row:
     """Build the row that judges whether the file declares every kind of error that it is required to declare.
 
-    The row includes kinds of error that have no row of their own.
+    It also covers kinds of error that have no row of their own.
     """
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)

@@ -67,9 +67,9 @@ class StayingAir:
     def _delays(self) -> frozenset[str]:
         """Ids of the rows that each judge a single delay.
 
-        With `combine: each`, the requirement on the quadratic phase limits these rows directly. However, if another
-        requirement sets the allowable of such a row, the status of the row does not give the status of the
-        requirement on the quadratic phase.
+        Under `combine: each`, the requirement on the quadratic phase limits these rows directly. A doubt about such
+        a row is recorded for this requirement and not for the row. The reason is that another requirement may set the
+        allowable of the row, so that its status is not the status of the requirement on the quadratic phase.
         """
         return frozenset(error.id for error in self.errors)
 

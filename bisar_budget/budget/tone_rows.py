@@ -312,9 +312,9 @@ class AcceleratedRow(FamilyRow):
 def _phases_beside(folded: LeftTone, free: PerCase, aperture_time: PerCase) -> tuple[PerCase, PerCase]:
     """Quadratic and cubic phase of a folded tone, from its parts below three cycles per aperture. [rad]
 
-    The parts are the frequencies to which synchronisation by an exchange of pulses folds (aliases) the tone. Each
-    part is taken at its worst starting phase, and the phases of all parts are added. `free` [rad] is the peak phase
-    of the tone without synchronisation.
+    Synchronisation by an exchange of pulses folds (aliases) the tone to several frequencies. The tone has one part at
+    each of them. The quadratic and cubic phases are computed for the worst starting phase of each part, and added
+    over all parts. `free` [rad] is the peak phase of the tone without synchronisation.
     """
     qpe: PerCase = 0.0
     cubic: PerCase = 0.0

@@ -240,7 +240,7 @@ class Vibrations:
         A group consists of vibration lines with neighbouring frequencies, whose echoes add with their worst starting
         phases. The equivalent single line has an echo of the same height. The result gives, for each line of each
         platform, the peak phase of the equivalent line, (lines, cases). It is NaN if the line has no neighbour on the
-        other platform, if the group has no amplitude, or if there is no requirement on PSLR.
+        other platform, if all lines of the group have the amplitude 0, or if there is no requirement on PSLR.
         """
         ours = self.count[PLATFORMS[0]]
         amplitudes, cycles = (

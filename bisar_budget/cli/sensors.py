@@ -146,7 +146,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
 
 
 def _document(content: JsonObject) -> str:
-    """Write a dictionary as indented JSON text."""
+    """Format a dictionary as indented JSON text."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 

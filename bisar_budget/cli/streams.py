@@ -132,10 +132,10 @@ def _is_open_as(file: str | int, path: str) -> bool:
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Return the folder relative to which reports name files that are outside any Git repository.
+    """Return the folder to which the paths in reports are relative, for files outside any Git repository.
 
-    Returns two values: the path of the folder, and whether it is the checkout of a GitHub Actions run. Outside such a
-    run it is the current folder. The path is empty if the current folder was removed.
+    Returns two values: the path of the folder, and whether the folder is the checkout of a GitHub Actions run.
+    Outside such a run, it is the current folder. The path is empty if the current folder was removed.
     """
     try:
         here = os.getcwd()
@@ -312,7 +312,7 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Context manager that yields the path of a temporary file, and finally replaces the file `path` by it.
+    """Context manager that yields the path of a temporary file, and finally replaces the file `path` with this file.
 
     The temporary file is in a temporary folder beside `path`. If `path` is a symbolic link, its target is replaced
     and the link remains. After an error or an interrupt, the old file remains. Named pipes, sockets and devices are

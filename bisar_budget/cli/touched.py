@@ -23,7 +23,7 @@ _SETTINGS_FILE = "pyproject.toml"
 
 
 class _ReadFiles:
-    """Reader of files on disk that records the real path of each file that it has read, in `read`."""
+    """Reader of files on disk; `read` holds the real paths of all files read so far."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
@@ -44,8 +44,8 @@ def touched_missions(changed: Sequence[str]) -> list[str]:
     These are the missions among the files `changed`, and missions that read one of these files. All missions below
     the current folder are examined. A mission is a YAML file with the sections of a mission, or any YAML file below a
     folder `missions` that does not describe a part. A changed `pyproject.toml` affects every mission below its
-    folder. An unusable mission that names other files is always listed, because it may name a deleted file, and a
-    list of changed files may not contain deleted files.
+    folder. An unusable mission that names other files is always listed, because it may name a deleted file, and
+    deleted files may be missing from the list of changed files.
     """
     paths = {os.path.realpath(file) for file in changed}
     tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS_FILE]

@@ -44,8 +44,9 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
     """Open a folder with the finished parts of a sweep, and lock it so that no other command uses it.
 
     If `is_resumed` is true, the command continues from the parts in the folder. Otherwise the folder must have no
-    parts. Raises `ClusterError` if there are parts although `is_resumed` is false, if the parts belong to another
-    question (the inputs of the sweep), if the folder cannot be written, or if another command uses it.
+    parts. `question` identifies the inputs of the sweep. Raises `ClusterError` if there are parts although
+    `is_resumed` is false, if the parts belong to another question, if the folder cannot be written, or if another
+    command uses it.
     """
     with ExitStack() as ends:
         try:

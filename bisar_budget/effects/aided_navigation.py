@@ -1,9 +1,9 @@
 """Random position error of a platform whose inertial unit is aided by GNSS, and its effect on the image.
 
-The position errors of such a navigation at two moments are correlated, and the correlation decides what the image
-shows: a constant error displaces the image, and only the change of the error over the aperture defocuses it. The
-joint covariance over the aperture comes from `navigation.smoother`. It is projected on the turning line of sight
-here.
+The position errors at different times are correlated. The correlation determines the effect on the image, because a
+constant error only displaces the image, whereas a change of the error over the aperture defocuses it. The module
+`navigation.smoother` computes the joint covariance of the errors over the aperture. This module projects the
+covariance on the line of sight, which turns over the aperture.
 """
 
 import math
@@ -52,31 +52,33 @@ class NavigationErrors:
     Attributes
     ----------
     covariance : AidedCovariance
-        Joint covariance of the position error over the aperture, in each case, without `level`.
+        Joint covariance of the position error over the aperture in each case. It does not include `level`, the factor
+        in decibels by which the mission file scales the error.
     """
 
     covariance: AidedCovariance
 
     def of(self, case: int) -> "NavigationErrors":
-        """Errors in one case, by its index."""
+        """Select the errors of the case with the given index."""
         return NavigationErrors(covariance=self.covariance.at(np.array([case])))
 
     @property
     def has_fixes(self) -> bool:
-        """Whether the flight has a fix, in the only case."""
+        """Whether the flight has at least one position fix; for a single case."""
         return bool(self.covariance.fix_count[0])
 
     @property
     def at_middle(self) -> tuple[float, ...]:
-        """Errors at mid-aperture in the only case, in the order of `findings.row.NavigationState`."""
+        """Rms errors at mid-aperture of a single case, in the order of `findings.row.NavigationState`."""
         states = (POSITION, VELOCITY, LEVEL_TILT, HEADING, GYRO_BIAS, ACCELEROMETER_BIAS)
         return tuple(float(self.covariance.rms(state)[0]) for state in states)
 
     @property
     def remaining_start(self) -> tuple[float, str]:
-        """Largest ratio of an error at mid-aperture to the same error at the start, and the name of this error.
+        """Fraction of an error assumed at the start that remains at mid-aperture, and the name of this error.
 
-        The heading is left out: a straight flight does not reveal it, and it has no effect there.
+        The fractions of the velocity error and of the tilt are compared, and the larger fraction is returned. The
+        heading error is left out, because it cannot be estimated on a straight flight, where it has no effect.
         """
         start = StartSigmas(heading_rad=np.zeros(1))
         _, velocity, tilt, *_ = self.at_middle
@@ -85,9 +87,10 @@ class NavigationErrors:
 
 
 def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Yield the error of a platform's aided navigation; no error if the file states none.
+    """Yield the random error of a platform's aided navigation, or nothing if the file states no such navigation.
 
-    Its unit is dB: the declared size is the covariance of the file, and its allowable a factor on this covariance.
+    The size of the error is a factor on the position error that follows from the file; the declared size is this
+    error itself, with the factor 1. The unit is nevertheless dB, because the row shows the factor in decibels.
     """
     error = seen.error(name)
     navigation = error.navigation
@@ -122,15 +125,15 @@ def aided_navigation(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _times(effect: RandomEffect, amplitude: PerCase) -> RandomEffect:
-    """Multiply an effect by an amplitude, its spread included: the level of the file scales the whole error."""
+    """Multiply an effect, including its spread phase, by the amplitude factor that the file states as a level."""
     return effect.times(amplitude)._replace(spread=effect.spread * amplitude)
 
 
 def _in_full_model(seen: SensorCases, covariance: AidedCovariance, along: Floats, at_nodes: Floats) -> RandomEffect:
     """Effect of the position error in the full model.
 
-    `along` (3, nodes, cases) is the range error per metre east, north and up. `at_nodes` (nodes, orders) are the
-    Legendre polynomials at the nodes.
+    `along` (3, nodes, cases) [m/m] is the range error per metre of position error east, north and up. `at_nodes`
+    (nodes, orders) are the values of the Legendre polynomials at the nodes of the aperture.
     """
     moved = np.einsum("no,oapbc,mp->nambc", at_nodes, covariance.of_orders, at_nodes, optimize=True)
     of_range = np.einsum("anc,nambc,bmc->nmc", along, moved, along, optimize=True)
@@ -155,10 +158,10 @@ def _published(seen: SensorCases, platform_index: int, covariance: AidedCovarian
 
 
 def _courses(covariance: AidedCovariance) -> Floats:
-    """Legendre coefficients of independent position errors that add to the given joint covariance. [m]
+    """Legendre coefficients of independent position errors that together have the given joint covariance. [m]
 
-    The result is (3, orders, errors, cases). The sum multiplies each error by an independent random number of
-    variance 1.
+    The result is (3, orders, errors, cases). If each error is multiplied by an independent random number of variance
+    1, the sum of all errors has this covariance.
     """
     orders, axes, _, _, cases = covariance.of_orders.shape
     flat = np.moveaxis(covariance.of_orders.reshape(orders * axes, orders * axes, cases), -1, 0)
@@ -169,7 +172,7 @@ def _courses(covariance: AidedCovariance) -> Floats:
 def navigation_errors(seen: SensorCases, name: str) -> NavigationErrors:
     """Joint covariance of the position error of a platform's aided navigation in each case.
 
-    Cases with the same navigation and the same path are computed once.
+    For cases with the same navigation and the same path, the covariance is computed only once.
     """
     navigation = seen.error(name).navigation
     assert navigation is not None
@@ -187,7 +190,7 @@ def navigation_errors(seen: SensorCases, name: str) -> NavigationErrors:
 
 
 def _inputs(seen: SensorCases, name: str, navigation: Navigation) -> dict[str, Floats]:
-    """Numbers of an aided navigation in each case, (..., cases)."""
+    """Collect the numbers that describe an aided navigation in each case, as arrays (..., cases)."""
     imu, gnss = navigation.imu, navigation.gnss
     scalars = {
         "half": seen.aperture_time / 2,
@@ -211,7 +214,7 @@ def _inputs(seen: SensorCases, name: str, navigation: Navigation) -> dict[str, F
 def _path_numbers(seen: SensorCases, name: str) -> Floats:
     """Numbers that determine the path of a platform in each case, (numbers, cases).
 
-    A path in pieces counts as a path of its own in each case.
+    If the path consists of several pieces, the paths of all cases count as different.
     """
     state: PlatformState = getattr(seen.geometry, name)
     vectors = [seen.vector(vector) for vector in (state.position, state.velocity, state.acceleration, *state.bends)]
@@ -228,7 +231,10 @@ def _covariance(
     state: PlatformState,
     order_count: int,
 ) -> AidedCovariance:
-    """Joint covariance of the position error for the numbers of `_inputs` and the paths `state` of the same cases."""
+    """Joint covariance of the position error in each of several cases.
+
+    `inputs` holds the numbers that `_inputs` returns, and `state` the paths of the platform in the same cases.
+    """
     half, is_smoothed = inputs["half"], navigation.is_smoothed
     turns = np.broadcast_to(_turns(state), half.shape)
     timeline = timeline_of([
@@ -272,7 +278,7 @@ def _covariance(
 
 
 def history_of(mission: Mission, name: str) -> FlightHistory | None:
-    """Velocity of a platform beyond the aperture; None if its path comes from no log."""
+    """Velocity of a platform beyond the aperture, from the log of its path; None without a log."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     return None if path is None else path.history
 
@@ -280,10 +286,10 @@ def history_of(mission: Mission, name: str) -> FlightHistory | None:
 def fix_schedule(
     navigation: Navigation, half: float, *, turns: bool = True, turns_outside: bool = False
 ) -> FixSchedule:
-    """Schedule of the fixes of an aided navigation, in plain numbers.
+    """Schedule of the position fixes of an aided navigation in a single case.
 
-    `half` is half the aperture time. [s] `turns` and `turns_outside` tell whether the path turns within and outside
-    the aperture.
+    `half` [s] is half the aperture time. `turns` is true if the path turns within the aperture, and `turns_outside`
+    is true if it turns outside the aperture.
     """
     return FixSchedule(
         half_s=half,
@@ -298,7 +304,10 @@ def fix_schedule(
 
 
 def _turns(state: PlatformState) -> Booleans:
-    """Whether the path of each case turns or changes its speed, (cases,) or one for all."""
+    """Whether a platform turns or changes its speed in each case.
+
+    The result is an array (cases,), or a single value that holds for all cases.
+    """
     bends = [np.abs(component) for vector in (state.acceleration, *state.bends) for component in vector]
     return np.asarray(sum(bends) > 0) | (state.curve is not None)
 
@@ -308,14 +317,15 @@ def flight_of(
 ) -> FlightSteps:
     """Attitude and specific force of a platform between the moments of a timeline.
 
-    Beyond the aperture the platform flies as its log says. Without a log it flies straight on with the velocity at
-    the end of the aperture; a platform in free fall goes on falling. Gravity is that of mid-aperture, and points down
-    in the axes of the scene: a navigation turns its level axes along with the Earth's curvature.
+    Outside the aperture, the platform has the velocity in its log. Without a log, it has the constant velocity with
+    which it enters or leaves the aperture; a platform in free fall continues to fall. Gravity has its value at
+    mid-aperture, and points down along the vertical axis of the scene, because a navigation turns its level axes with
+    the Earth's curvature.
 
     Parameters
     ----------
     mission : Mission
-        Mission, whose scene has the axes of the result.
+        Mission whose scene defines the axes of the result.
     name : str
         Name of the platform.
     state : PlatformState
@@ -352,9 +362,10 @@ def _velocities(
     falling: PerCase,
     history: FlightHistory | None,
 ) -> Floats:
-    """Velocities of a platform at slow times within and beyond the aperture, (3, *times.shape). [m/s]
+    """Velocities of a platform at slow times within and outside the aperture, (3, *times.shape). [m/s]
 
-    `falling` is 1 for a platform in free fall, and 0 for any other. `history` is the velocity by a log.
+    `falling` is 1 for a platform in free fall, and 0 otherwise. `history` is the velocity in the log, if there is a
+    log.
     """
     inside = np.clip(times, -half, half)
     position, velocity = (np.array(np.broadcast_arrays(*vector, inside)[:3]) for vector in state.at(inside))

@@ -46,9 +46,10 @@ DELAY, CONTENT = DELAYS
 
 
 def obliquity(position: Vectors, shell: PerCase) -> PerCase:
-    """Ratio of the path length of a leg in a thin atmospheric shell to the length of a vertical path through it.
+    """Ratio of the length of a slant path through a thin atmospheric shell to the length of a vertical path.
 
-    A leg is the path between a platform and the scene. The ratio is exact for a spherical Earth.
+    The slant path is a leg, which is the path between a platform and the scene. The ratio is exact for a spherical
+    Earth.
 
     Parameters
     ----------
@@ -63,9 +64,10 @@ def obliquity(position: Vectors, shell: PerCase) -> PerCase:
 
 
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> PerCase:
-    """Ratio of the delay on a platform's leg to the delay at the zenith, for positions (…) of the platform.
+    """Ratio of the delay on a platform's leg to the delay at the zenith, (…).
 
-    `delay` is an entry of `DELAYS`. `middle` is the platform's position at mid-aperture.
+    `delay` is an entry of `DELAYS`. `position` is the platform's position, with components (…), and `middle` is its
+    position at mid-aperture.
 
     For a platform below `AIR_TOP_M`, the neutral air is treated as on a flat Earth. The ratio for free electrons is
     then 0, because all of them are above the leg. At an elevation below `LEAST_ELEVATION_DEG`, the ratio for the
@@ -164,9 +166,10 @@ def legs_of(owner: str) -> tuple[str, ...]:
 def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
     """Yield the errors due to atmospheric delays, declared or not; yields nothing if the file has no `propagation`.
 
-    A delay that the file states for both legs together is one random number. It delays both legs, each by the factor
-    for its own elevation. The effects on both legs add with their signs before they are squared. Each leg then also
-    has a row of its own. This row is only informative, because its effect is already part of the row of the mission.
+    A delay that the file states for both legs together is a single random number. On each leg it is multiplied by the
+    factor for the elevation of this leg. The effects on both legs add with their signs before they are squared. The
+    sum is in a row of the mission. Each leg also has a row of its own, which is only informative, because its effect
+    is already part of the row of the mission.
     """
     propagation = seen.mission.propagation
     if propagation is None:
@@ -258,8 +261,8 @@ def changing_air(
 ) -> list[RandomError]:
     """List the errors due to declared constant delays, computed as if the delays had the given correlation time [s].
 
-    Only delays without a correlation time of their own are listed. A delay that both legs share is one error in the
-    list. `geometry` is the geometry of the cases, and `cases` is their number.
+    Only delays without a correlation time of their own are listed. If both legs share a delay, the list contains a
+    single error for it. `geometry` is the geometry of the cases, and `cases` is their number.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]

@@ -45,7 +45,7 @@ class Correlated(NamedTuple):
         return f"{self.platform}.covariance"
 
     def of(self, cases: Indices) -> "Correlated":
-        """Return the same covariance with the correlations of the cases with the given indices."""
+        """Return a copy of the covariance that has only the correlations in the cases with the given indices."""
         rows = [
             [rho[cases] if isinstance(rho, np.ndarray) and rho.ndim else rho for rho in row]
             for row in self.correlation

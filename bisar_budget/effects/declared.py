@@ -66,12 +66,13 @@ class Declared(NamedTuple):
 
     `displacement` [m] is the displacement east and north for the declared sign of the error. `opposite` [m] is the
     displacement for the opposite sign. For a pure phase error, and in the published model if the matrix Q of equation
-    (25) in Rigling & Moses has no inverse, both are NaN; in plain numbers they are None. A displacement is also NaN
-    if no ground point has the range history that the error with this sign causes. The phases are then infinite.
+    (25) in Rigling & Moses has no inverse, both are NaN, or None if the fields are plain numbers. A displacement is
+    also NaN if no ground point has the range history that the error with this sign causes. The phases are then
+    infinite.
 
-    `hidden` [rad] is the hidden phase, which autofocus does not correct. A part of the range error remains for any
-    displacement of the image, because of the finite bandwidth and the turn of the line of sight. The hidden phase is
-    the quadratic phase that lowers the peak as much as this part does.
+    `hidden` [rad] represents the part of the range error that remains for any displacement of the image, because of
+    the finite bandwidth and the turn of the line of sight. This hidden phase is the quadratic phase that lowers the
+    peak as much as the remaining range error does. Autofocus does not correct it.
     """
 
     qpe: Any
@@ -84,8 +85,9 @@ class Declared(NamedTuple):
     def judged(self, gain: PerCase) -> PerCase:
         """Phase to compare with a limit that has been raised by the gain of autofocus. [rad]
 
-        Autofocus corrects the quadratic phase φ₂, but not the hidden phase φₕ. The limit is raised for both by the
-        factor `gain`, so the hidden phase is multiplied by the same factor. The result is √(φ₂² + (gain·φₕ)²).
+        Autofocus corrects the quadratic phase φ₂, but not the hidden phase φₕ. The limit is nevertheless raised for
+        both, by the factor `gain`. To compensate for this, the hidden phase is multiplied by the same factor. The
+        result is √(φ₂² + (gain·φₕ)²).
         """
         phase: PerCase = np.hypot(self.qpe, gain * self.hidden)
         return phase
@@ -265,8 +267,8 @@ class ErrorBlock:
     def hidden_per_unit(self) -> Floats:
         """First-order hidden phase and rms phase beyond the cubic order per unit of each error. [rad/unit]
 
-        The array is (2, errors, cases). Both phases are 0 for errors that do not displace the image. Autofocus does
-        not correct the hidden phase, which `Declared` defines.
+        The array is (2, errors, cases). Both phases are 0 for errors that do not displace the image. `Declared`
+        defines the hidden phase, which autofocus does not correct.
         """
         phases = np.zeros((2, *self.declared.shape))
         if self.moves:
@@ -316,8 +318,8 @@ class ErrorBlock:
     def _bent(self, size: Floats) -> PerCase:
         """Upper bound of the part of a platform's motion that is not proportional to the error's size. [m]
 
-        Only a time tag error has such a part, because the platform is displaced along its path, which may be curved.
-        The bound, (errors, cases), is the distance that `DeclaredErrors.bent` returns, doubled if the direct path
+        Only a time tag error has such a part, because it displaces the platform along a path that may be curved. The
+        bound, (errors, cases), is the distance that `DeclaredErrors.bent` returns, doubled if the direct path
         synchronizes the clocks. The result is the number 0 if the block has no time tag error.
         """
         tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
@@ -452,7 +454,7 @@ class ErrorBlock:
 
     @property
     def paths(self) -> PointPaths:
-        """Paths of the image point as errors grow, for the errors of the block that displace it.
+        """Paths of the image point as an error grows, for the errors of the block that displace the image.
 
         For each error, the paths for the positive sign come first, followed by the paths for the negative sign.
         """
@@ -466,7 +468,7 @@ class ErrorBlock:
         return self._follows
 
     def forget(self) -> None:
-        """Release the paths of the image point to free their memory, which is large."""
+        """Release the paths of the image point, which use much memory."""
         self._follows = None
 
     @cached_property
@@ -697,9 +699,10 @@ class DeclaredErrors:
         return Lanes(case, at_nodes.reshape(len(at_nodes), -1), moves, directions, order, tags)
 
     def _of_lanes(self, values: Any, signs: int) -> Any:
-        """Arrange values (..., errors, cases) in lanes, (..., lanes), with a copy for each of `signs` signs.
+        """Arrange values (..., errors, cases) in lanes, (..., lanes), with a copy of each value for each sign.
 
-        A value for a single error in a single case is the same for all lanes. It becomes (..., 1).
+        `signs` is the number of signs. If there is only a single error in a single case, the value is the same for
+        all lanes, and the result is (..., 1).
         """
         *more, errors, cases = values.shape
         if errors == cases == 1:
@@ -809,13 +812,14 @@ class DeclaredErrors:
     def doubts(self, model: str, is_over: PerCaseFlag) -> PerCaseFlag:
         """Mark the cases in which the model that does not decide the verdict makes a result doubtful.
 
-        `model` is the name of this model, and `is_over` marks the cases in which it exceeds a limit. With a direct
-        path the published model makes no result doubtful, because it does not include the direct path.
+        `model` is the name of this model, and `is_over` marks the cases in which an effect according to it exceeds a
+        limit. With a direct path the published model makes no result doubtful, because it does not include the direct
+        path.
         """
         return False if model == "published" and self.has_direct_path else is_over
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
-        """Note that explains why a model gives no displacement of the image in a case.
+        """Return a note explaining why a model gives no displacement of the image in a case.
 
         The note is empty if the model gives a displacement.
         """
@@ -880,7 +884,7 @@ class Model:
         return source.equation if self.is_published or not source.is_motion else "full model"
 
     def no_limit(self, source: ErrorSource) -> Note:
-        """Note that explains why no size of an error reaches a limit of the quadratic phase."""
+        """Return a note explaining why an error of any size stays within the limit of the quadratic phase."""
         if self.is_published or not source.is_heard:
             return source.no_limit
         return phrases.note("no-size-reaches-the-limit") if source.is_motion else phrases.note("no-quadratic-phase")
@@ -928,7 +932,7 @@ class Model:
     def hidden_per_unit(self, source: ErrorSource) -> float:
         """First-order hidden phase per unit of an error; 0 in the published model. [rad/unit]
 
-        Autofocus does not correct the hidden phase, which `Declared` defines.
+        `Declared` defines the hidden phase, which autofocus does not correct.
         """
         block, index = self.errors.block_of(source)
         return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
@@ -956,12 +960,15 @@ class Model:
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
-        """Whether second-order bounds show that the effects of an error of a given size are proportional to it."""
+        """Whether second-order bounds show that an error of the given size has effects proportional to its size."""
         block, index = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
-        """Phases and displacement due to an error of signed size `size`, from exact ranges; None without an image."""
+        """Phases and displacement due to an error of the signed size `size`; None if the error leaves no image.
+
+        They are computed from exact ranges.
+        """
         block, index = self.errors.block_of(source)
         is_asked = np.zeros(block.declared.shape, dtype=bool)
         is_asked[index] = True

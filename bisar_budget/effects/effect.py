@@ -121,24 +121,25 @@ class ErrorSource(NamedTuple):
 
     Numbers are plain, or arrays over cases. `declared` is signed and includes the coverage factor. It is None if the
     file declares no size. `is_independent` is true for an error along an axis in which the file states it. Sums and
-    root-sum-squares include only such errors. An error stated along the track is therefore not counted again by its
-    components along the scene's axes.
+    root-sum-squares include only such errors. An error stated along the track is therefore not counted a second time
+    through its components along the scene's axes.
 
-    `direction` is a unit vector in the axes of the scene, or zero for an error that is not a motion. For an error of
-    the mission, `direction` holds for both platforms, unless `of_receiver` gives the receiver a direction of its own.
-    The direction of a time tag error is the velocity at the nodes of the aperture, (nodes, cases), along which a
-    small time tag error moves the platform. [m/s]
+    `direction` is a vector in the axes of the scene: the unit vector along which the error moves the platform, or
+    zero if the error moves no platform. For a time tag error it is the velocity [m/s] at the nodes of the aperture,
+    (nodes, cases), because a small time tag error moves the platform along its velocity. If the error is declared for
+    the mission, and not for a single platform, `direction` applies to both platforms, unless `of_receiver` gives the
+    receiver a direction of its own.
 
     `clock` has the coefficients t̃₀ … t̃₃ of one unit of a clock error. They are zero if synchronization removes the
     error. `clock` is None for any other error.
 
-    `shifts` are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for each axis.
-    [m/unit] They are set for a registered kind of error. They are also set if a platform is in free fall, where the
+    `shifts` [m/unit] are the motions of both platforms over the aperture per unit of the error, (nodes, cases) for
+    each axis. They are set for a registered kind of error. They are also set if a platform is in free fall, where the
     motion follows the dynamics of the orbit. Otherwise they are None.
 
-    `rates` are velocities at mid-aperture per unit of a position error in the frame `ric`, if a platform is in free
-    fall. Such an error has no velocity in inertial space, and therefore has a velocity in the axes of the scene,
-    which rotate with the Earth. [(m/s)/unit] `rates` is None for all other errors.
+    `rates` [(m/s)/unit] are velocities at mid-aperture per unit of a position error in the frame `ric`, if a platform
+    is in free fall. Such an error has no velocity in inertial space, and therefore has a velocity in the axes of the
+    scene, which rotate with the Earth. `rates` is None for all other errors.
     """
 
     subject: Subject
@@ -222,7 +223,7 @@ class ErrorSource(NamedTuple):
 
     @property
     def is_registered(self) -> bool:
-        """Whether another package registered the kind of the error, whose motion is then `shifts`."""
+        """Whether another package registered the kind of the error; the motion of the error is then in `shifts`."""
         return self.kind.is_registered
 
     @property
@@ -288,7 +289,7 @@ class LinePiece(NamedTuple):
 
 
 def gradients_of(model: str) -> str:
-    """Name of the range and Doppler gradients in a model's matrix Q_i: as in Rigling & Moses, or true gradients."""
+    """Short description of the gradients in a model's matrix Q_i: as in Rigling & Moses, or true gradients."""
     return PRINTED if model == "published" else TRUE
 
 
@@ -307,8 +308,7 @@ def indicated_point(
         Piece of the range error, without the range history of the scatterer itself.
     model : str
         For `published`, Q_i is taken from equation (30) as printed, with the platforms at their positions at τ_i and
-        the slant ranges at mid-aperture. For any other name, the true gradients of the lines of sight at τ_i are
-        used.
+        the slant ranges at mid-aperture. For any other name, the true range and Doppler gradients at τ_i are used.
     seen_from : (2,)
         Position of the scatterer, east and north. [m]
 

@@ -171,7 +171,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
 
 
 def _path_of_sensor(name: str) -> KeyPath:
-    """Path of the key that names the parts of a platform from which figures of its motion error come."""
+    """Path of the key `sensor`, which names the catalogue parts from which a platform's motion error is taken."""
     return (*IMU_KIND.section(name)[:-1], "sensor")
 
 
@@ -318,8 +318,8 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Yield the errors of a platform's lever arm; no errors if the file states no lever arm.
 
-    They are the effect of attitude errors through the arm, declared or not, and the declared uncertainty of the arm.
-    The row of an aided navigation includes the effect of its attitude errors through the arm.
+    They are the effect of declared and undeclared attitude errors through the arm, and the declared uncertainty of
+    the arm. The row of an aided navigation includes the effect of its attitude errors through the arm.
     """
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm

@@ -96,7 +96,7 @@ def is_unshaken(mission: Mission, name: str) -> PerCaseFlag:
 
 
 class AcceleratedTone(NamedTuple):
-    """Tone in the phase of an oscillator that a sinusoidal vibration causes.
+    """Tone that a sinusoidal vibration causes in the phase of an oscillator.
 
     `name` is the platform, and `entry` the index of the vibration in the file. `frequency` is in Hz, and
     `acceleration` [m/s²] is the amplitude of the acceleration. `free` [rad/(s²/m)] is the peak phase before
@@ -231,9 +231,9 @@ def turn_courses(state: PlatformState, moments: Floats, interval: PerCase | None
     """Time error per unit of acceleration sensitivity along each axis of the scene, (3, moments, …). [s/(s²/m)]
 
     It is v(τ) − v(0), the change of the velocity v since mid-aperture. `moments` [s] are slow times. If the clocks
-    exchange pulses at an `interval` [s], the result is the remainder after synchronization. The first exchange may be
-    at any time within an interval, so the remainders for several start times are returned, (3 · start times, moments,
-    …). They are scaled so that the sum of their squares is the mean square over the start times.
+    exchange pulses, once per `interval` [s], the result is the remainder after synchronization. The first exchange
+    may be at any time within an interval, so the remainders for several start times are returned, (3 · start times,
+    moments, …). They are scaled so that the sum of their squares is the mean square over the start times.
     """
 
     def gained(tau: PerCase) -> Floats:

@@ -50,8 +50,8 @@ class Noise(NamedTuple):
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
     """One-sided phase-noise spectrum of an oscillator at a given centre frequency. [rad²/Hz]
 
-    `center_frequency` is in Hz, and `aperture_time` in s. The `level` of the oscillator in dB scales the spectrum. A
-    power law that is fitted to an Allan deviation may depend on the aperture time, see `fitted`.
+    `center_frequency` is in Hz, and `aperture_time` in s. The spectrum is scaled by the `level` [dB] of the
+    oscillator. A power law that is fitted to an Allan deviation may depend on the aperture time, see `fitted`.
     """
     center_frequency *= 10 ** (oscillator.level / 20)  # the noise grows as the square of the frequency
     if oscillator.phase_noise is not None:
@@ -304,11 +304,11 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
     """Effects of a clock's phase error in the published and in the full model.
 
     `noise` and `tones` [rad²] are the mean squares of the Legendre components of the clock's noise and of its slow
-    tones over the aperture. Orders 0 and 1 of the noise are included if they are finite. Otherwise the displacement
-    is unknown and is NaN, except that it is 0 if the quadratic and cubic phases are 0. If the file states the
-    constant and the linear term of the clock, these terms replace orders 0 and 1 of the noise. Orders 0 and 1 of the
-    slow tones are then still included. If the line of sight turns, orders 2 and 3 also displace the image, which
-    reduces the defocus that they cause.
+    tones over the aperture. Orders 0 and 1 of the noise are included if they are finite. If they are infinite, the
+    displacement is set to 0 if the quadratic and cubic phases are 0; otherwise it is unknown and set to NaN. If the
+    file states the constant and the linear term of the clock, these terms replace orders 0 and 1 of the noise. Orders
+    0 and 1 of the slow tones are then still included. If the line of sight turns, orders 2 and 3 also displace the
+    image, which reduces the defocus that they cause.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
@@ -331,9 +331,9 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
     """Mean squares of the Legendre components of the oscillator phase left by synchronization, (parts, cases). [rad²]
 
-    They hold for a centre frequency of 1 Hz. For a centre frequency of f₀ Hz they are f₀² times as large. The parts
-    are the Legendre parts in the fields of `Parts`. With `is_below_mask`, only the spectrum below the first point of
-    the mask is included.
+    They hold for a centre frequency of 1 Hz. For a centre frequency of f₀ Hz they are f₀² times as large. The first
+    axis has the components in the order of the fields of `Parts`. With `is_below_mask`, only the spectrum below the
+    first point of the mask is included.
 
     The remaining phase depends on how the clocks are synchronized. For free clocks, all of the noise remains. If the
     clocks exchange pulses, the noise between the exchanges remains. If the clocks were set before the aperture, the

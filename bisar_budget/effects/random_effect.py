@@ -63,9 +63,9 @@ class RandomEffect(NamedTuple):
     `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
     the products of their units. It is None in the published model, which has only the sigmas.
 
-    `hidden` [rad/unit] is the hidden phase. For any displacement of the image, a part of the range error remains,
-    mainly constant and linear in time. The hidden phase is the quadratic phase that lowers the peak as much as this
-    part does. Autofocus cannot correct it, see `ranges.exact_ranges`.
+    `hidden` [rad/unit] represents the part of the range error that remains for any displacement of the image; this
+    part is mainly constant and linear in time. The hidden phase is the quadratic phase that lowers the peak as much
+    as this part does. Autofocus cannot correct it, see `ranges.exact_ranges`.
 
     `rest` [rad/unit] is the rms phase beyond the cubic for an error that is not noise, such as a bias. It is the
     value at one sigma, without the coverage factor. It spreads power, as does the phase beyond the cubic due to any
@@ -146,12 +146,13 @@ class RandomError(NamedTuple):
     """Random error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
 
     `declared` is the declared size, coverage factor included; None if the file declares no size. For an error along
-    several axes it is the largest size of all axes, and the sizes of all axes are proportional to it. The unit of an
-    oscillator's error is `dB`, and its noise is declared as an amplitude factor of 1. `noise` is the spectrum of an
-    oscillator; it is None if the numbers are arrays over cases, and for errors of any other kind. `noise_in_case`
-    computes the spectrum from the mission of one case and the name of the platform. `navigation` is the covariance of
-    an aided navigation, and None for errors of any other kind. `spreads` is true for noise, and
-    false for an error whose variation over the aperture has only a few orders.
+    several axes it is the largest size of all axes, and the sizes of all axes are proportional to it. For an
+    oscillator the size is a factor on the amplitude of its noise, and the declared size is 1. The unit is
+    nevertheless `dB`, because the row shows this factor in decibels. `noise` is the spectrum of an oscillator; it is
+    None if the numbers are arrays over cases, and for errors of any other kind. `noise_in_case` computes the spectrum
+    from the mission of one case and the name of the platform. `navigation` is the covariance of an aided navigation,
+    and None for errors of any other kind. `spreads` is true for noise, and false for an error whose variation over
+    the aperture has only a few orders.
 
     `counted_in` is the id of another row that already includes the effect of this error. This error is then left out
     of sums. `moves` is the motion of platforms due to one unit, used for the edge of a scene. It is empty for clocks
@@ -192,7 +193,7 @@ class RandomError(NamedTuple):
 
     @property
     def equation(self) -> str:
-        """Source of the effect of the error, for reports."""
+        """Name of the equation or method from which the effect of the error follows, for reports."""
         return self.kind.size(self.subject.axis).equation
 
     @property
@@ -500,7 +501,7 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
     phase is the root-sum-square of its four parts.
 
     If terms cancel exactly, a variance is only rounding error. It is then small compared with the squared magnitude
-    in `sizes` (8, cases). Such a variance is set to 0, because it would lead to a limit that does not exist.
+    in `sizes` (8, cases). Such a variance is set to 0, because a limit computed from it would be meaningless.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes

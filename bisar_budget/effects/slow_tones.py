@@ -2,17 +2,17 @@
 
 A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is unknown. The effects are computed
 for values of ψ all around the circle, and the largest effect counts. The effects of a small vibration follow from the
-effects of a cosine and a sine. Where the second order matters, the effects follow from the image point of exact
-ranges. Since the line of sight turns, motion along the track also has an effect. The vibration also displaces the
-image, and this displacement adds phases.
+effects of a cosine and a sine. Where the second order matters, the effects are computed from exact ranges at the
+displaced image point. Since the line of sight turns, motion along the track also has an effect. The vibration also
+displaces the image, and this displacement adds phases.
 
 As a function of ψ, the square of each resulting phase is a sum of harmonics. For a small vibration it has only a
-constant and the second harmonic. A few values of ψ are therefore enough to find the largest square. The axes may
-vibrate in any phase, so their largest effects add.
+constant and the second harmonic. A few values of ψ are therefore enough to find the largest square. The vibrations
+along different axes may have any relative phase, so their largest effects add.
 
 A vibration that the file states along the line of sight follows the turn of the line of sight, and all of it is range
 error. The method is derived here, not taken from a publication. `tests/effects/test_slow_tones.py` checks it against
-exact ranges in 36 phases.
+exact ranges for 36 values of ψ.
 """
 
 import math
@@ -78,7 +78,7 @@ class TonePhases:
 
     @cached_property
     def rest(self) -> Floats:
-        """Sum of the rms phases beyond the cubic of all axes, each at its worst phase ψ, (cases,). [rad]"""
+        """Sum over all axes of the rms phase beyond the cubic order, each at its worst phase ψ, (cases,). [rad]"""
         return _worst(np.square(self.rests))
 
     def judged(self, gain: PerCase) -> Floats:

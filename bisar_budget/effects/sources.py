@@ -63,8 +63,8 @@ def exact_ranges(
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
     """Name of the distribution of a declared error: `normal`, `uniform` or `bound`.
 
-    It is that of the error's size (`ErrorSize.distribution`), or else the one that the file states for the motion
-    error of the platform, or of both platforms in common.
+    If the size of the error (`ErrorSize.distribution`) does not determine the distribution, the file states it for
+    the motion error of the platform, or for the motion error that both platforms share.
     """
     distribution = source.kind.size(source.subject.axis).distribution
     if distribution != AS_STATED:
@@ -657,7 +657,8 @@ def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
 def _of_both_platforms(vectors: Mapping[int, AnyVector]) -> tuple[AnyVector, AnyVector]:
     """Convert a mapping of platform index to vector to a pair of vectors, transmitter first.
 
-    A platform that is missing in the mapping gets the vector of the other platform, which is not used.
+    If a platform is missing in the mapping, its place in the pair is filled with the vector of the other platform.
+    This placeholder is not used.
     """
     first = next(iter(vectors.values()))
     return vectors.get(0, first), vectors.get(1, first)
@@ -678,7 +679,7 @@ def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
 def _total(terms: Sequence[PerCase]) -> PerCase:
     """Sum of terms; 0 if the terms cancel except for rounding errors.
 
-    A sum that is only rounding error would lead to a limit that does not exist.
+    A limit computed from a sum that is only rounding error would be meaningless.
     """
     total = sum(terms)
     return np.where(np.abs(total) > VECTOR_ROUNDING_FRACTION * sum(np.abs(term) for term in terms), total, 0.0)
@@ -697,7 +698,7 @@ def _axis_of(frame: str, axis: str) -> str:
 
 
 def _no_limit(kind: StateKind, axis: str) -> Note:
-    """Note that explains why an error of one kind along one axis may have no limit due to the quadratic phase error.
+    """Return a note explaining why the quadratic phase may set no limit to an error of one kind along one axis.
 
     `axis` is the name of the axis in the note.
     """

@@ -32,7 +32,8 @@ class Parts(NamedTuple):
     `quadratic` and `cubic` are the mean squares of the quadratic and the cubic part at the aperture edge. `left` is
     the mean square of the phase beyond the cubic. `constant` and `linear` are the mean squares of the constant and
     the linear part at the aperture edge, which displace the image. `constant_quadratic` and `linear_cubic` are mean
-    products of two parts. `constant`, `linear` and these two mean products are infinite if slow noise has no bound.
+    products of two parts. `constant`, `linear` and these two mean products are infinite if the slow noise is
+    unbounded.
 
     `constant_linear`, `constant_cubic` and `linear_quadratic` are mean products of a part of even order and a part of
     odd order. They are nonzero only for the phase of a clock that was set before the aperture. In any other phase,
@@ -104,7 +105,8 @@ def tone(angle: PerCase) -> Floats:
     """Largest Legendre components of a tone of amplitude 1 over the aperture, each at its worst phase, (5, ...).
 
     `angle` [rad] is πfT. The rows are quadratic part, cubic part, fraction of the tone's power beyond the cubic,
-    constant part, and linear part. The four parts are amplitudes at the aperture edge.
+    constant part, and linear part. The quadratic, cubic, constant and linear part are given as amplitudes at the
+    aperture edge.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
@@ -250,7 +252,7 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Integrals of a spectrum x^(−slope), weighted by the squared Legendre components of a tone, to each panel edge.
+    """Integrals, up to each panel edge, of a spectrum x^(−slope) weighted by a tone's squared Legendre components.
 
     The angle x [rad] is πfT, where f is the frequency and T the aperture time. The integrals begin at the first edge
     of the panels. The result is (parts, edges), with the components in the order of `squares`.
@@ -264,8 +266,8 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
 
     The function is used at the ends of a spectrum, which cover a panel only partly. The angle x [rad] is πfT, where f
     is the frequency and T the aperture time. `low` and `high` (cases,) are the limits of the integrals in x. The
-    result is (parts, cases), with the components in the order of `squares`. Low and high frequencies are integrated
-    by formulas of their own. The result is 0 if `low` equals `high`.
+    result is (parts, cases), with the components in the order of `squares`. Separate formulas are used for low and
+    for high frequencies. The result is 0 if `low` equals `high`.
     """
     total = np.zeros((_INTEGRAL_COUNT, low.size))
     is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
@@ -401,7 +403,7 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
 
 
 def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
-    """Yield the mean squares and products of the Legendre orders of a tone of power 1, for a clock that was set.
+    """Yield the mean squares and products of the Legendre orders of a tone of power 1, for a clock set beforehand.
 
     The line that was fitted to set the clock is subtracted. The values are Re(A_m·A_n*), in the shape of `f` [Hz],
     for the pairs of orders mn = 00, 11, 01, 02, 03, 12, 13. The amplitudes A₀ and A₁ are given in `set_parts`.
@@ -623,8 +625,8 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
     """Sum of a power law at steps from `low` to `high`, both included, by the Euler–Maclaurin formula. [rad²/Hz]
 
     `low`, `high` and `step` are in Hz. The sum is the integral divided by the step, plus half of the values at both
-    ends, plus B₂ₖ/(2k)!·step^(2k−1) times the difference of odd derivatives between the ends. The first, third and
-    fifth derivatives are used.
+    ends, plus correction terms for k = 1, 2 and 3. Term k is B₂ₖ/(2k)!·step^(2k−1) times the difference between the
+    derivatives of order 2k − 1 at both ends.
     """
     slope, density, derivatives = piece.slope, [], []
     for f in (low, high):
@@ -669,7 +671,7 @@ def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
-    """Yield the ends of a piece, and the frequencies at which a steep piece has fallen by powers of e⁶. [Hz]"""
+    """Yield the ends of a piece, and the frequencies at which a steep piece has fallen by e⁶, e¹² and e¹⁸. [Hz]"""
     yield from (piece.low, piece.high)
     if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high
@@ -680,8 +682,8 @@ def _ends(piece: PowerLawPiece) -> Iterator[float]:
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
     """Lower and upper ends of the frequency panels into which `edges` divide the range from 0 Hz to `high`. [Hz]
 
-    Edges that differ only by rounding count as a single edge. A frequency in a panel between them could be folded
-    onto 0 Hz, where a spectrum has no value.
+    Edges that differ only by rounding count as a single edge. Otherwise a frequency in the panel between them could
+    be folded onto 0 Hz, where a spectrum has no value.
     """
     kept = [0.0]
     for edge in sorted(edges):

@@ -14,7 +14,7 @@ sin(πx)/(πx), whose sidelobes reach the next echo. The phases of vibrations ar
 echoes add in phase at a position x. Their sum is Σ φ_k/2·|sinc(x − n_k)|, and the position with the largest sum is
 used. This method is derived here, not taken from a publication. From three cycles per aperture on, it agrees within
 0.5 dB with transforms of the phasor for the worst phases (`tests/effects/test_echoes.py`). The echoes at −n_k are
-left out. They would add up to 0.3 dB at three cycles, and less at more cycles.
+left out. They would raise the sum by at most 0.3 dB at three cycles, and by less at more cycles.
 
 A spectrum S_a of acceleration corresponds to the spectrum S_x = S_a/(2πf)⁴ of displacement. Its quadratic phase,
 cubic phase, spread and displacement are the integrals of `spectra`. Motion slower than the aperture is therefore
@@ -156,7 +156,7 @@ def worst_phases(
 
 
 def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
-    """Select the starting points of the search that have the highest expected echo, without duplicates.
+    """Select the starting points of the search at which the highest echoes are expected, without duplicates.
 
     The points are ranked by the sum of the amplitudes of the tones within one resolution cell of the point. `sizes`
     are the amplitudes (tones, cases), and `frequencies` the cycles per aperture of the tones. `starts` (points,
@@ -273,7 +273,8 @@ def counted(
 
     `metric` is `pslr` for an amplitude and `islr` for an rms. `value` [m] is a single value along the line of sight,
     or three values along the axes of the platform's frame. The projections follow from `seen_of_axes`. Projected
-    amplitudes add, because the axes may vibrate in any phase. Rms values are independent, so their squares add.
+    amplitudes add, because the relative phases of the vibrations along the axes are unknown. Rms values are
+    independent, so their squares add.
     """
     sizes = value if isinstance(value, tuple) else (value,)
     seen = seen_of_axes(mission, name, is_vector=isinstance(value, tuple), geometry=geometry)
@@ -352,9 +353,9 @@ class DeclaredPhase(NamedTuple):
     `cubic_rad` is None for a pure quadratic phase. `coverage` is the coverage factor that both phases include.
     `is_there` marks the cases in which a vibration is slow; in all other cases its phases are 0.
 
-    `hidden_rad` [rad] is the hidden phase, which is added to the quadratic phase as a root-sum-square. For any
-    displacement of the image, a part of the range error remains, mainly constant and linear in time. The hidden phase
-    is the quadratic phase that lowers the peak as much as this part does, see `ranges.exact_ranges`.
+    `hidden_rad` [rad] is combined with the quadratic phase as a root-sum-square. It represents the part of the range
+    error that remains for any displacement of the image; this part is mainly constant and linear in time. The hidden
+    phase is the quadratic phase that lowers the peak as much as this part does, see `ranges.exact_ranges`.
     """
 
     row_id: str

@@ -1,4 +1,4 @@
-"""Kinds of error of the clocks: terms of the clock error, errors of its setting, oscillators and their link.
+"""Kinds of clock error: terms of the clock error, errors that remain after a setting, oscillators, and their link.
 
 A clock error is a time error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³ over the slow time τ. (1)
 """
@@ -28,17 +28,18 @@ def clock_range_error(terms: "Sequence[PerCase]", times: "Floats") -> "Floats":
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClockSize(ErrorSize):
-    """A size of a clock error: a time error, its rate of change, or a faster one.
+    """A size of a clock error: a time error, a rate of change of the time error, or a change of higher order.
 
     Attributes
     ----------
     order : int
-        Order of the rate of change: 0 for a time error, 1 for an error of frequency.
+        Order of the change in time: 0 for a time error, 1 for an error of frequency.
     symbol : str
         Symbol of the size in formulas, for an error with which a clock was set. It is empty for a term of the clock
         error itself.
     formulas : tuple of str
-        Formulas of the terms t̃₀, t̃₁ and t̃₂ of an error with which a clock was set, with the time H since then.
+        Formulas of the terms t̃₀, t̃₁ and t̃₂ of an error with which a clock was set, as functions of the time H
+        since the setting.
     direct_title : str
         Title of the terms in an explanation if the receiver uses a direct path; empty if the title stays the same.
     """
@@ -49,10 +50,10 @@ class ClockSize(ErrorSize):
     direct_title: str = ""
 
     def terms(self, age: "PerCase" = 0.0) -> "tuple[PerCase, ...]":
-        """Coefficients t̃₀ … t̃₃ of an error of one unit at mid-aperture.
+        """Coefficients t̃₀ … t̃₃, about mid-aperture, of a clock error of one unit.
 
-        `age` is the time H from the setting of the clock to mid-aperture. [s] An error of the setting has grown to
-        (H + τ)ⁿ/n!, with n = `order`.
+        `age` [s] is the time H from the setting of the clock to mid-aperture. At the slow time τ, an error of the
+        setting has grown to (H + τ)ⁿ/n!, with n = `order`.
         """
         if not self.symbol:
             return tuple(float(power == self.order) for power in range(4))
@@ -70,7 +71,7 @@ class ClockKind(SourceKind):
     moves: str = "clock"
 
     def clock_size(self, axis: str = "") -> ClockSize:
-        """Size of a clock error along an axis that is a term of it; raises `TypeError` for random phases."""
+        """Size of the term of a clock error that `axis` names; raises `TypeError` for random phases."""
         size = self.size(axis)
         if not isinstance(size, ClockSize):
             raise TypeError(f"{self.name}.{axis} is no term of a clock error")

@@ -35,16 +35,16 @@ class ErrorKind:
     common_id_form : str
         Form of the row ids of an error that both platforms share; empty if the kind has no such error.
     is_computed : bool
-        Whether the tool computes the declared size of a row, so that a size of zero is a result.
+        Whether the tool computes the size that a row shows as declared; a size of zero is then a computed result.
     only_warns : bool
         Whether the row warns and never fails.
     is_by_rule : bool
-        Whether the row combines errors by the rule `allocation.combine`.
+        Whether the row combines errors according to the rule `allocation.combine`.
     is_vibration : bool
         Whether the row judges a vibration.
     spectrum_axis : str, optional
-        Axis of the row about a declared spectrum, whose levels in decibels are relative to that spectrum; None if the
-        kind has no such row.
+        Axis in the id of the row for a declared spectrum. The levels in this row are in decibels relative to the
+        spectrum. None if the kind has no such row.
     is_source : bool
         Whether the row is that of an error source.
     is_sum : bool
@@ -57,7 +57,7 @@ class ErrorKind:
         What an error source affects: the path of a `platform`, a `clock`, the delay in the `air`, or the `image`
         itself if the file states only the effect of the error. Empty for a sum.
     is_of_log : bool
-        Whether the error is the noise of a log of a flight, whose file is the source of the error.
+        Whether the error is the noise of a flight log; the file of the log is then the source of the error.
     owes_source : bool
         Whether reports list a declared error of the kind if the file states no source for it.
     """
@@ -118,9 +118,9 @@ class ErrorSize:
         Dimension of the size.
     key : str
         Key of the size below the key or section of its kind (`SourceKind.key_form`), with the fields `{axis}` and
-        `{index}`. It is empty if the key of the kind is that of the size.
+        `{index}`. It is empty if the key of the kind itself states the size.
     section_form : str
-        Form of the path of the section that has the key, if it is not that of the kind.
+        Form of the path of the section that contains the key, if this is not the section of the kind.
     distribution : str
         What the size means: `NORMAL`, `BOUND`, `AS_STATED`, `PEAK_AMPLITUDE` or `RELATIVE_LEVEL`.
     equation : str
@@ -128,7 +128,7 @@ class ErrorSize:
     has_axes : bool
         Whether the file may state three sizes, one along each axis, in place of one.
     unit_text : str
-        Unit of the size in SI, as rows write it, if it is not that of the dimension.
+        Unit of the size in SI, as written in rows, if it is not the unit of the dimension.
     """
 
     dimension: units.Dimension
@@ -141,7 +141,7 @@ class ErrorSize:
 
     @property
     def unit(self) -> str:
-        """Unit of the size in SI, as rows write it."""
+        """Unit of the size in SI, as written in rows."""
         return self.unit_text or self.dimension.si
 
 
@@ -169,8 +169,8 @@ class SourceKind(ErrorKind):
     flown_as : str
         Field of the simulator's `PathError` that takes the size of the error; empty if the error has no such field.
     drawn_as : str
-        Quantity that is drawn over time for a random error: the `motion` of platforms, or the `delay` or `phase` of
-        the echoes. Empty if nothing is drawn.
+        Quantity of which a simulation draws random time series: the `motion` of platforms, or the `delay` or `phase`
+        of the echoes. Empty if no time series are drawn.
     shifts_time : bool
         Whether the error shifts a path in time.
     is_registered : bool
@@ -184,7 +184,7 @@ class SourceKind(ErrorKind):
     is_largest_of_axes : bool
         Whether the declared size is described as the largest of three axes.
     direction : str
-        Name of the direction of the error, if its ids have no axis for it.
+        Name of the direction of the error, if no axis in its ids gives the direction.
     """
 
     description: str
@@ -215,7 +215,7 @@ class SourceKind(ErrorKind):
         return self.size().unit
 
     def section(self, owner: str, axis: str = "") -> KeyPath:
-        """Path of the key or section of the mission file that states errors of an owner, of one axis or of any."""
+        """Path of the key or section of the mission file that states an owner's errors, for one axis or for all."""
         form = self.common_key_form if self.common_key_form and owner == "mission" else self.key_form
         if axis in self.sizes:
             form = self.sizes[axis].section_form or form
@@ -224,8 +224,8 @@ class SourceKind(ErrorKind):
     def path(self, owner: str, axis: str = "", index: int | None = None) -> KeyPath:
         """Path of the size of an error in the mission file.
 
-        `index` is the index of the error in a list of the file, or that of its axis. Without an index, the path ends
-        above it.
+        `index` is the index of the error, or of its axis, in a list of the file. Without an index, the path ends at
+        the list.
         """
         keys: list[str | int] = []
         for key in filter(None, self.size(axis).key.split(".")):

@@ -1,7 +1,7 @@
 """Kinds of error of a measured path: position, velocity, acceleration, time tag and height.
 
-Each of them, and each kind that another package registers, says by which motion an error of one unit displaces the
-antenna's phase centre.
+Each of these kinds, and each kind that another package registers, defines the motion error of the antenna's phase
+centre that an error of one unit causes.
 """
 
 from collections.abc import Mapping
@@ -58,8 +58,8 @@ class StateKind(PathKind):
     symbol : str
         Symbol of the error in formulas.
     defocusing_vectors : tuple of str
-        Name of the vector along which an error has to be to defocus the image, singular and plural. It is empty for a
-        position error, which defocuses along no vector.
+        Name, in singular and plural, of the vector along which an error must have a component to defocus the image.
+        Empty for a position error, because there is no such vector.
     """
 
     order: int
@@ -78,7 +78,7 @@ class StateKind(PathKind):
         return self.order < 2
 
     def course(self, times: "Floats") -> "Floats":
-        """Position error along its direction per unit: 1, τ or τ²/2, the terms of the error polynomial (22)."""
+        """Position error along its direction per unit: 1, τ or τ²/2, as in equation (22) of Rigling & Moses."""
         return (np.ones_like(times), times, times**2 / 2)[self.order]
 
     def moved(
@@ -91,7 +91,8 @@ class StateKind(PathKind):
     ) -> "VectorArrays":
         """Motion error per unit along a direction, east, north and up, (nodes, cases) each. [m/unit]
 
-        The motion is the polynomial of (22), or, if the platform is in free fall, follows the dynamics of the orbit.
+        The motion is the polynomial of equation (22) in Rigling & Moses. If the platform is in free fall, the motion
+        instead follows the dynamics of the orbit.
 
         Parameters
         ----------
@@ -121,9 +122,9 @@ class StateKind(PathKind):
         return self.order == 0 and frame == "ric" and path.fall is not None
 
     def rate(self, path: "PlatformState", direction: "Vectors", frame: str) -> "Vectors":
-        """Velocity at mid-aperture, in the axes of the scene, of a position error that keeps its direction.
+        """Velocity at mid-aperture, in scene axes, of a position error that keeps its direction. [(m/s)/unit]
 
-        It is zero for any other error. [(m/s)/unit]
+        It is zero for any other error.
         """
         if path.fall is None or not self.keeps_direction(path, frame):
             return NO_DIRECTION
@@ -139,11 +140,11 @@ def _along(motions: "Floats", direction: "Vectors") -> "Floats":
 class TimeTagKind(PathKind):
     """The kind of error of navigation time relative to radar time.
 
-    With an error δt, the measured position at a time is the true position at a time later by δt.
+    With an error δt, the position measured for the time t is the true position at the time t + δt.
     """
 
     def moved(self, path: "PlatformState", times: "Floats", direction: "Vectors" = NO_DIRECTION) -> "Vectors":
-        """Motion error per unit of a small error: the velocity of the platform, (nodes, cases) each. [m/s]"""
+        """Motion error per unit of a small error: the platform's velocity, three components (nodes, cases). [m/s]"""
         u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
         return u, v, w
 
@@ -152,7 +153,8 @@ class TimeTagKind(PathKind):
 class HeightKind(PathKind):
     """The kind of error of the scene's height.
 
-    A scene that is higher than the processor assumes acts as if both platforms were measured too high.
+    A scene that is higher than the processor assumes has the same effect as platforms that are both measured too
+    high.
     """
 
     def moved(self, path: "PlatformState", times: "Floats", direction: "Vectors" = NO_DIRECTION) -> "Vectors":

@@ -1,6 +1,7 @@
 """Kinds of random error, and of errors for which a mission file states only the effect on the image.
 
-A random error has a sigma and no sign. Its courses over the aperture are drawn (`SourceKind.drawn_as`).
+A random error has a sigma and no sign. A simulation draws random time series of the error over the aperture
+(`SourceKind.drawn_as`).
 """
 
 import math
@@ -22,12 +23,12 @@ class InertialFigure(ErrorSize):
     Attributes
     ----------
     integrals : int
-        Number of integrations over time from the error to the position error. A constant error that is integrated n
-        times becomes τⁿ/n!.
+        Number of integrations over time that convert the error to the position error. A constant error that is
+        integrated n times becomes τⁿ/n!.
     symbol : str
         Symbol of the error in formulas.
     tilt_formula : str
-        Formula of the tilt over the slow time τ that the error causes; empty if it causes none.
+        Formula, as a function of the slow time τ, of the tilt that the error causes; empty if it causes no tilt.
     spreads : bool
         Whether the error is noise, which spreads power. Otherwise it is a random constant.
     is_scale : bool

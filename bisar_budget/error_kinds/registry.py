@@ -1,4 +1,4 @@
-"""Registry of the kinds of error: those of this package, the sums of their effects, and those of other packages.
+"""Registry of the kinds of error in this package, of the kinds of sums of errors, and of kinds from other packages.
 
 A package adds a kind with `register`, or with an entry point in the group `bisar_budget.kinds`. Entry points are read
 only when a mission file or an option uses an unknown kind, because reading them takes longer than a check.
@@ -133,7 +133,7 @@ class MotionKind(PathKind):
 
     @property
     def origin(self) -> str:
-        """Description of the kind for messages, with the distribution whose entry point provides it, if any."""
+        """Description of the kind for messages, with the installed package whose entry point provides it, if any."""
         distribution = _DISTRIBUTIONS.get(self.name)
         return f"registered kind {self.name}" + (f" of the distribution {distribution}" if distribution else "")
 

@@ -1,4 +1,4 @@
-"""Findings of a check and of every other question, as frozen data that reports show."""
+"""Findings of a check and of all other computations, as frozen data that reports show."""
 
 # Modules that other rooms may use.
 __all__ = [

@@ -85,9 +85,9 @@ class MissionFindings(NamedTuple):
         return f"MissionFindings({self.file!r}, {shown(self.name)!r}, {self.status!r})"
 
     def texts_of(self, judged: JudgedRequirement | Row) -> list[str]:
-        """Wordings of the project's requirements whose ids a row or requirement has.
+        """Texts of the project's requirements to which a row, or a requirement of the mission, refers by id.
 
-        Ids without a wording are left out.
+        Ids without a text are left out.
         """
         return [
             self.requirement_texts[own_id] for own_id in judged.requirement_ids if own_id in self.requirement_texts

@@ -8,13 +8,14 @@ from bisar_budget.phrases import Note
 class Requirement(NamedTuple):
     """Result of the draws for one requirement: how often it is met.
 
-    `sum` and `rss` are the sizes of the errors combined according to the rules of `allocation.combine` with these
-    names. They follow from the full model and include the coverage factor; they are None if a declared error leaves
-    no image. `sigma_rss` is the standard uncertainty as the root-sum-square of the errors. `sigma` is the standard
-    uncertainty of the draws with an image; it is None if no draw has an image. For displacements `sigma_rss` and
-    `sigma` are rms lengths. `probability` is the fraction of draws that meet the requirement; `probability_low` and
-    `probability_high` are the ends of its Wilson interval. `probability_normal` is the probability for a normal
-    distribution with the variances of the errors. `dominant` is the error with the largest share of the variance.
+    `sum` and `rss` are the sizes of the errors, combined according to the rules `sum` and `rss` of
+    `allocation.combine`. They follow from the full model and include the coverage factor; they are None if a declared
+    error leaves no image. `sigma_rss` is the standard uncertainty as the root-sum-square of the errors. `sigma` is
+    the standard uncertainty of the draws with an image; it is None if no draw has an image. For displacements
+    `sigma_rss` and `sigma` are rms lengths. `probability` is the fraction of draws that meet the requirement;
+    `probability_low` and `probability_high` are the ends of its Wilson interval. `probability_normal` is the
+    probability for a normal distribution with the variances of the errors. `dominant` is the error with the largest
+    share of the variance.
     """
 
     id: str

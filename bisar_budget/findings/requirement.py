@@ -1,6 +1,6 @@
 """The table of requirements of a mission.
 
-It has the limit of each requirement, the value that the mission reaches, and the row that decides the status.
+For each requirement it has the limit, the value that the mission reaches, and the row that decides the status.
 """
 
 from dataclasses import dataclass

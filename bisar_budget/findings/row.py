@@ -20,7 +20,7 @@ class AppliedWaiver(NamedTuple):
     """A waiver that names a failing row or requirement.
 
     `line` is its line in the file, `until` is its last day, and `id` is written as in the file. `is_expired` tells
-    whether the last day is over. `place` is its index among the waivers of the file.
+    whether the last day has passed. `place` is its index among the waivers of the file.
     """
 
     line: int | None
@@ -50,7 +50,7 @@ def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaive
 
 
 class NavigationState(NamedTuple):
-    """Errors of an aided navigation at mid-aperture: roots of the sums of the variances of all axes.
+    """Errors of an aided navigation at mid-aperture, each the root of the sum of the variances along all axes.
 
     `tilt_rms_rad` is the error of roll and pitch.
     """
@@ -72,12 +72,13 @@ class Row(NamedTuple):
     `qpe_full_rad`, which comes from exact ranges. `published_margin_db` is the margin of the published rule for a
     vibration relative to first principles. `binding_requirement` is the requirement that sets `allowable`.
     `cubic_rad` is the magnitude of the declared error's cubic phase at the aperture edge. `islr_db` is the ISLR that
-    a declared random error adds. `equal_loss_qpe_rad` is the quadratic phase with the same loss of the peak as
-    `qpe_full_rad` and the hidden phase together; the hidden phase is the part that the bandwidth and the turn of the
-    line of sight do not resolve. `rest_rad` is the rms value of the phase terms above the cubic one. `model` is the
-    model that gives these numbers. `waivers` are the waivers, valid or expired, that name the row while it fails.
-    `refuted` names the images that refute the limit of the row. `navigation` has the errors at mid-aperture if the
-    row is that of an aided navigation. `requirement_ids` are the ids that the project gives to the row.
+    a declared random error adds. `equal_loss_qpe_rad` is the quadratic phase that lowers the peak as much as
+    `qpe_full_rad` and the hidden phase together. The hidden phase represents the part of the range error that remains
+    for any displacement of the image, because of the finite bandwidth and the turn of the line of sight. `rest_rad`
+    is the rms phase beyond the cubic order. `model` is the model that gives these numbers. `waivers` are the waivers,
+    valid or expired, that name the row while it fails. `refuted` names the images that refute the limit of the row.
+    `navigation` has the errors at mid-aperture if the row is that of an aided navigation. `requirement_ids` are the
+    ids that the project gives to the row.
     """
 
     subject: Subject

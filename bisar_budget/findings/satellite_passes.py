@@ -1,4 +1,4 @@
-"""Findings of `passes`: the passes of a satellite over a scene, each with the verdict of the mission in it."""
+"""Findings of `passes`: the passes of a satellite over a scene, each with the verdict on the mission for it."""
 
 import math
 from collections import Counter

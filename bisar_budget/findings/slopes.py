@@ -95,12 +95,12 @@ class Slope(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """Effect that doubling one error of a mission has on the other errors, once the shares are balanced again.
+    """Effect of doubling one error of a mission on the other errors, after the budget shares are balanced again.
 
-    `shares_before` and `shares_after` are the shares of transmitter and receiver before and after the doubling.
-    `transmitter` and `receiver` each contain the worst row of the platform after the doubling, and the worst
-    utilization of the platform before and after the doubling. Only judged rows of errors that are not doubled count.
-    The field of a platform is None if it has no such rows.
+    `shares_before` and `shares_after` are the budget shares of transmitter and receiver before and after the
+    doubling. `transmitter` and `receiver` each contain the worst row of the platform after the doubling, and the
+    worst utilization of the platform before and after the doubling. The rows of the doubled error, and rows that are
+    not judged, are left out. The field of a platform is None if no row of the platform remains.
     """
 
     key: str

@@ -14,7 +14,7 @@ class State(NamedTuple):
     `row` has the highest utilization of the rows that decide; `requirement` sets its allowable. Both are None if no
     row is judged. `reason` explains why the mission is invalid at this value; it is empty if the mission is valid.
     `waived_by` are the ids of the waivers of a waived state, which does not comply. `doubts` are the codes of the
-    warnings that doubt the mission. Resolutions are from peak to first null on the ground. [m]
+    warnings that question the mission. Resolutions [m] are from peak to first null on the ground.
     """
 
     value: float

@@ -17,9 +17,9 @@ class Specification(NamedTuple):
     `value` is the computed size. `ordered` is the specified value: the computed size rounded down. `text` is the
     specified value as written in a mission file. If no requirement limits the error, `value` and `ordered` are None
     and `text` is empty. `found_text` is the text of `value` in the same unit. `remark` explains the number to a
-    supplier. `declared` is the declared size in the file, the largest of three axes. `shares` maps each requirement
-    to the fraction of its limit that the error uses, in the row in which this fraction is largest. `parts` are the
-    parts of the catalogue that meet the specified value.
+    supplier. `declared` is the declared size in the file; if the file states a size for each of three axes, it is the
+    largest. `shares` maps each requirement to the fraction of its limit that the error uses, in the row in which this
+    fraction is largest. `parts` are the parts of the catalogue that meet the specified value.
     """
 
     key: str

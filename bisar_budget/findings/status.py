@@ -39,7 +39,7 @@ class Status(NamedTuple):
 
     @property
     def is_held(self) -> bool:
-        """Whether a number was compared with a limit and the verdict holds: it was evaluated, and is not waived."""
+        """Whether a number was compared with a limit, so that there is a verdict, and this verdict is not waived."""
         return self.is_judged and not self.junit_words
 
     @property

@@ -102,7 +102,7 @@ class Element:
         return element
 
     def with_child(self, path: str, child: str, text: str) -> "Element | None":
-        """First element at a path whose child `child` has the text `text`; None if there is no such element."""
+        """First element at a path with a child `child` that has the text `text`; None if there is no such element."""
         return next(
             (element for element in self.all(path) if element.maybe(child) and element.text(child) == text), None
         )

@@ -218,9 +218,9 @@ def _vectors(
     Also returns the time from the start of the collection to the middle of the aperture [s]. `smooth` is the flight
     `flown` without vibration and fast errors. The slow time of a pulse is the time at which it reaches the scene
     centre. The pulse leaves the transmitter R_t/c earlier and is received R_r/c later, where both ranges follow from
-    the measured positions. The reference time of section 6.5.1 (5) is thus the slow time. While slow time advances by
-    1 s, the time of transmission advances by 1 − Ṙ_t/c and the time of reception by 1 + Ṙ_r/c. Velocities with
-    respect to slow time are therefore divided by these factors.
+    the measured positions. The reference time in section 6.5.1 (5) of the standard is thus the slow time. While slow
+    time advances by 1 s, the time of transmission advances by 1 − Ṙ_t/c and the time of reception by 1 + Ṙ_r/c.
+    Velocities with respect to slow time are therefore divided by these factors.
     """
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]

@@ -492,7 +492,7 @@ def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str
 
 
 def _names(xml: Element, path: str) -> tuple[str, list[str]]:
-    """Read the name of the collection, and make a remark that names its collector and illuminator if stated."""
+    """Read the name of the collection, and make a remark that names the stated collector and illuminator."""
     elements = {key: xml.maybe(f"{path}/{key}") for key in ("CoreName", "CollectorName", "IlluminatorName")}
     core, collector, illuminator = (element.text() if element is not None else "" for element in elements.values())
     collected = f"Collected by {shown(collector)}" if collector else ""

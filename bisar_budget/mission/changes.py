@@ -188,7 +188,9 @@ def _put(container: Content, name: str | int, value: object) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Content:
-    """Parse the value that an option sets, as if it were in the file; a number from a sweep is not parsed.
+    """Parse the value that an option sets in the same way as a value in the file.
+
+    A value that comes from a sweep is already a number, and is returned unchanged.
 
     Faults are added to the tree and name the option. Returns `INVALID` for a string that cannot be parsed.
     """

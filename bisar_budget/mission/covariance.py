@@ -160,8 +160,8 @@ _ELEMENTS = [[_BLOCKS[(i > 2) + (j > 2)] for j in range(MATRIX_SIZE)] for i in r
 class _MatrixReader(Reader[Covariance]):
     """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes.
 
-    The class reads such a matrix from a mission file: the covariance matrix of the position error and the velocity
-    error.
+    The class reads such a matrix from a mission file. It is the joint covariance of the position error and the
+    velocity error.
     """
 
     def read(self, value: object, path: KeyPath, report: Report) -> Covariance | Invalid:

@@ -194,8 +194,9 @@ def _nested(parts: Sequence[str], value: str) -> str:
 
 
 def _with_entry(text: str, node: Node, key: str, remaining: Sequence[str], value: str) -> str:
-    """Add a key to the mapping `node`, or an entry to the list `node`, in its style: on one line or several lines.
+    """Add a key to the mapping `node`, or an entry to the list `node`.
 
+    The style of the mapping or list is kept: its content is either on one line or on several lines.
     `remaining` are the nested keys between the new key or entry and the value.
     """
     nested_value, start, end = _nested(remaining, value), node.start_mark.index, node.end_mark.index

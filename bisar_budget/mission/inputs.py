@@ -31,7 +31,7 @@ def input_files(mission: Mission) -> list[InputFile]:
     """List the files that a mission reads.
 
     These are the mission file and the files of its requirements, logs, orbits and parts. Files that belong to a log
-    or an orbit, such as its accuracy, are also listed.
+    or an orbit, such as the file with its accuracy, are also listed.
     """
     return list(dict.fromkeys(_input_files(mission)))
 

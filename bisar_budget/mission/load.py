@@ -106,8 +106,8 @@ def parse_mission(
         Function that takes the name of a part that the mission names, and returns the path and the content of its
         file. It may raise `PartError`. By default parts are searched for in the folders of `parts.folders`.
     is_placed : bool
-        Whether the paths of platforms on the Earth are computed. Without these paths the mission has no geometry, and
-        can be used for any `collection.center_time`.
+        Whether to compute the paths of platforms if a mission needs positions on the Earth. Without these paths the
+        mission has no geometry, but it can be used for any `collection.center_time`.
 
     Raises
     ------
@@ -222,9 +222,9 @@ def _with_hint(fault: Fault) -> Fault:
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Add a hint that names the `--set` options, if the fault is in the file rather than in an option.
+    """To a fault in the file, add a hint that names all `--set` options, because they may have caused it.
 
-    The fault may be due to these options.
+    A fault that is located in an option itself is returned unchanged.
     """
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))

@@ -288,7 +288,7 @@ class Requirements(NamedTuple):
 
 
 def id_of_requirement(key: str) -> str:
-    """Id of the requirement with a given key, such as `requirement.islr`, as used in lists of row ids."""
+    """Id of a requirement as used in lists of row ids, such as `requirement.islr` for the key `islr`."""
     return f"requirement.{key}"
 
 
@@ -360,7 +360,10 @@ def _noise_cut_off(values: SectionValues) -> Iterator[Problem]:
 
 
 def _too_many_fixes(values: SectionValues) -> Iterator[Problem]:
-    """Yield a problem for each aided navigation with more fixes than a check has time and memory for."""
+    """Yield a problem for each aided navigation with more than `MAX_FIX_COUNT` fixes.
+
+    With more fixes, a check would take too much time or memory.
+    """
     platforms, collection = values.get("platforms"), values.get("collection")
     if platforms is None or collection is None:
         return
@@ -553,7 +556,8 @@ class Mission(NamedTuple):
     parts : tuple of PartFile
         Files of the parts that the mission names.
     taken : tuple of TakenFigure
-        Figures that the mission takes from parts. A file that states these figures itself describes the same mission.
+        Figures that the mission takes from parts. A file that stated these figures itself would describe the same
+        mission.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -709,9 +713,9 @@ class Mission(NamedTuple):
     def line(self, path: KeyPath) -> Place | None:
         """Line number of a value in the mission file, starting at 1, and the region that the value occupies.
 
-        If the file does not contain the value, the line and the region of the nearest section above it are returned,
-        or else of the first key of the file. The result is None for a mission without a file, and for a value that an
-        option has set.
+        If the file does not contain the value, the result refers to the nearest section above it, or, if there is no
+        such section, to the first key of the file. The result is None for a mission without a file, and for a value
+        that an option has set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
@@ -731,7 +735,7 @@ def _at_a_glance(state: PlatformState) -> str:
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission states sensors, lever arms, clocks, vibration spectra or flight logs that are not smoothed.
+    """Whether a mission has sensors, lever arms, clocks, vibration spectra, or flight logs used without smoothing.
 
     The errors that they cause vary randomly over an aperture.
     """

@@ -197,13 +197,13 @@ class Navigation(NamedTuple):
 
     @property
     def after_s(self) -> PerCase:
-        """Flight after the aperture whose fixes are used. [s]"""
+        """Duration of the flight after the aperture from which fixes are used. [s]"""
         if not self.is_smoothed:
             return 0.0
         return DEFAULT_FLIGHT_S if self.after is None else self.after
 
     def fix_count(self, aperture_time: PerCase) -> PerCase:
-        """Number of fixes during the flight, without outages, for an aperture time in s."""
+        """Number of fixes during the flight for an aperture time [s]; outages are not subtracted."""
         return 1 + (self.before + aperture_time + self.after_s) * self.gnss.rate
 
     @property
@@ -220,12 +220,15 @@ class Navigation(NamedTuple):
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Sources of all figures, each once."""
+        """Sources of all figures; a source of several figures is listed once."""
         return tuple(dict.fromkeys(filter(None, map(self.evidence, self.figures))))
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
-        """Refuse fixes after the aperture for a filter, and figures that no part can supply."""
+        """Refuse a filter that is to use fixes after the aperture, and a section that lacks a needed figure.
+
+        A section that names a part is not checked here, because the part may supply the figure.
+        """
         if values.get("method") == FILTERED_METHOD and values.get("after"):
             yield Problem("a filter uses no fixes after the aperture", "accepted: no after, or 0 s", at=("after",))
         for key in ("imu", "gnss"):

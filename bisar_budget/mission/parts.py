@@ -608,7 +608,8 @@ def _with_aiding_parts(
 ) -> Navigation | Invalid:
     """Complete an aided navigation with the figures of the parts that it names; `INVALID` if a problem is reported.
 
-    Figures that come from parts are appended to `taken`. A figure that the file states replaces that of a part.
+    Figures that come from parts are appended to `taken`. If the file states the same figure as a part, the figure of
+    the file is kept.
     """
     overridden, part_sources, is_valid = [], dict[str, str](), True
     for kind, figure_keys in (("imu", AIDED_IMU_FIGURES), ("gnss", AIDED_GNSS_FIGURES)):

@@ -227,7 +227,10 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
 
 
 def _flight_of(mission: Mission, platform: Platform) -> tuple[float, float] | None:
-    """First and last slow time of the flight that an aided navigation of a platform uses; None without one. [s]"""
+    """First and last slow time [s] of the part of the flight that the aided navigation of a platform uses.
+
+    None if the platform has no aided navigation.
+    """
     navigation, half = platform.motion_error.navigation, mission.collection.aperture_time / 2
     return None if navigation is None else (-half - navigation.before, half + float(navigation.after_s))
 
@@ -457,7 +460,8 @@ def _of_log(
 ) -> FlownPath:
     """Path of a platform over the aperture from the flight log that the mission names, or from the cache.
 
-    `flight` are the first and the last slow time of the flight that an aided navigation uses [s]; None without one.
+    `flight` are the first and the last slow time [s] of the part of the flight that an aided navigation uses; None if
+    the platform has no aided navigation.
     """
     aperture_time = mission.collection.aperture_time
     try:
@@ -617,7 +621,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether a covariance matrix has a correlation between two errors that is larger than a rounding error."""
+    """Whether any two errors of a covariance matrix have a correlation that is larger than a rounding error."""
     off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
     return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 

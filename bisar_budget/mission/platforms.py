@@ -211,7 +211,7 @@ class MotionError(NamedTuple):
         return dict(self.of_parts).get(figure, self.source)
 
     def is_of_part(self, figure: str) -> bool:
-        """Whether a figure comes from a part of the catalogue or from the source of the path, not from a key."""
+        """Whether a figure comes from a part of the catalogue or from the source of the path."""
         return figure in dict(self.of_parts)
 
     def key_of(self, figure: str) -> str:

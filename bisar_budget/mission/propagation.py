@@ -125,7 +125,7 @@ class Propagation(NamedTuple):
         return self.transmitter is None and self.receiver is None
 
     def content(self, platform: str) -> float | None:
-        """Zenith electron content on the leg of a platform; None if the file states none for this leg. [1/m²]"""
+        """Zenith electron content [1/m²] on the leg of a platform; None if the file does not state it."""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
 

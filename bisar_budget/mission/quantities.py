@@ -390,7 +390,7 @@ def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
 def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue) -> SectionValue:
     """Return a copy of a section or value in which the number at the path `steps` is replaced.
 
-    A value with three components gets the new number in each of them.
+    If the value has three components, each of them is replaced.
     """
     if not steps:
         return (number, number, number) if isinstance(value, tuple) else number

@@ -188,7 +188,10 @@ class Quantity(Reader[float]):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> JsonObject:
-        """JSON Schema that refuses zero, positive or negative numbers in any unit if the bounds exclude them."""
+        """JSON Schema that refuses zero or numbers of a certain sign, in any unit.
+
+        All positive numbers, all negative numbers, and zero are refused if the bounds exclude them.
+        """
         gt, ge, lt, le = self.bounds
         if self.dimension.offsets:  # a unit shifts the zero
             return {}

@@ -163,7 +163,7 @@ def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
 def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults: _Faults) -> RequirementEntry | None:
     """Check a line of the file on its own, and return its entry; None if the line has a fault.
 
-    A line whose used cells are all empty also gives None.
+    A line without text in the known columns is ignored; the result is then also None.
     """
     count = len(faults.faults)
     last = cells[-1]
@@ -214,7 +214,7 @@ def _without_apostrophe(cell: Cell) -> Cell:
 
 
 def _written(line: RequirementEntry) -> str | list[str]:
-    """Limit of a line as it would be in a mission file: a string, or a list of strings for the key `declare`."""
+    """Limit of a line as a mission file would state it: a string, or a list of strings for the key `declare`."""
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text

@@ -1,17 +1,19 @@
 """Growth of the errors of an inertial navigation between two moments, as a linear state-space model.
 
-The state has the errors of position and velocity, the tilt of the navigation's axes, the biases of accelerometers and
-gyros, and, if the errors of the fixes wander, the wandering part of the fixes:
+The state consists of the errors of position and velocity, the tilt of the navigation's axes, and the biases of
+accelerometers and gyros. If a part of the position error of the fixes is correlated in time, it belongs to the state
+as well, as a Gauss–Markov process. The equations of motion are
 
     δṗ = δv,    δv̇ = ψ × f + R·(b_a + n_a),    ψ̇ = R·(b_g + n_g).
 
-f is the specific force [m/s²] and R the rotation from the axes of the body to those of the scene, both constant over
-a step. n_a and n_g are white. The biases are random walks. The axes of position, velocity and tilt are those of the
-scene. The rotation of the Earth, its curvature and the Schuler oscillation are left out, which is right for minutes.
+f is the specific force [m/s²], and R is the rotation from the axes of the body to the axes of the scene; both are
+constant during a step. n_a and n_g are white noise. The biases b_a and b_g are random walks. Position, velocity and
+tilt are given along the axes of the scene. The rotation and the curvature of the Earth and the Schuler oscillation
+are neglected, which is accurate enough for flights of a few minutes.
 
 The matrix F of the model is nilpotent, F⁴ = 0. Its exponential over a step is therefore a polynomial, and so is the
-covariance of the noise that a step adds. Both are exact for constant f and R. Derived here; `tests/navigation`
-compares them with series and with a dense batch.
+covariance of the noise that a step adds. Both are exact for constant f and R. They were derived for this program;
+`tests/navigation` compares them with series and with a dense batch solution.
 """
 
 import math
@@ -37,9 +39,9 @@ class InertialUnit:
     Attributes
     ----------
     accelerometer_bias_mps2, gyro_bias_radps : (cases, 3)
-        Size of the biases, which walk from there.
+        Sigma of the biases, which also determines their random walk during the flight. [m/s²], [rad/s]
     first_accelerometer_bias_mps2 : (cases, 3)
-        Bias of the accelerometers at the start of the flight, with the effect of their scale factors.
+        Bias of the accelerometers at the start of the flight, including the effect of their scale factors. [m/s²]
     velocity_random_walk, angle_random_walk : (cases, 3)
         White noise of accelerometers [m/s/√s] and gyros [rad/√s].
     """
@@ -58,13 +60,13 @@ class Fixes:
     Attributes
     ----------
     position_m : (cases, 3)
-        White error of a position.
+        Sigma of the white noise of a position. [m]
     velocity_mps : (cases, 3)
-        White error of a velocity; infinite if the receiver gives no velocity.
+        Sigma of the white noise of a velocity; infinite if the receiver gives no velocity. [m/s]
     wander_m : (cases, 3)
-        Gauss–Markov process beside the white error of a position.
+        Sigma of a Gauss–Markov process that is added to the white noise of a position. [m]
     wander_time_s : (cases,)
-        Correlation time of this process; infinite if it is 0.
+        Correlation time of this process; infinite if there is no such process. [s]
     """
 
     position_m: Floats
@@ -79,18 +81,18 @@ class Fixes:
 
 
 def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Floats, size: int) -> Floats:
-    """Transition matrices of steps, (steps, cases, size, size).
+    """Matrices that propagate the state over each step, (steps, cases, size, size).
 
     Parameters
     ----------
     steps : (steps, cases)
-        Durations. [s]
+        Durations of the steps. [s]
     body : (steps, cases, 3, 3)
-        Rotation from the axes of the body to those of the scene.
+        Rotation from the axes of the body to the axes of the scene.
     force : (steps, cases, 3)
         Specific force in the axes of the scene. [m/s²]
     wander_time_s : (cases,)
-        Correlation time of the wandering part of the fixes.
+        Correlation time of the Gauss–Markov process in the position error of the fixes. [s]
     size : int
         Number of states, 15 or 18.
     """
@@ -118,7 +120,8 @@ def transitions(steps: Floats, body: Floats, force: Floats, wander_time_s: Float
 def step_noise(steps: Floats, body: Floats, force: Floats, unit: InertialUnit, fixes: Fixes) -> Floats:
     """Covariance of the noise that each step adds to the state, (steps, cases, size, size).
 
-    The arguments are those of `transitions`.
+    `steps`, `body` and `force` are the same as in `transitions`. `unit` and `fixes` are the errors of the inertial
+    unit and of the fixes.
     """
     size = fixes.state_size
     noise, tilted = np.zeros((*steps.shape, size, size)), moved_by_tilt(force)
@@ -153,7 +156,11 @@ def step_noise(steps: Floats, body: Floats, force: Floats, unit: InertialUnit, f
 
 
 def _add_impulse_responses(noise: Floats, steps: Floats, responses: Sequence[tuple[slice, Floats, int]]) -> None:
-    """Add to `noise` the covariance due to one white noise, from the responses of the state to its impulses."""
+    """Add to `noise` the covariance that a single source of white noise causes during each step.
+
+    `responses` describe how parts of the state respond to an impulse of this noise: each item has the slice of the
+    state, a matrix, and the power of the time since the impulse.
+    """
     for (rows, a, m), (columns, b, n) in product(responses, repeat=2):
         power = m + n + 1
         growth = steps[..., None, None] ** power / (math.factorial(m) * math.factorial(n) * power)
@@ -161,10 +168,10 @@ def _add_impulse_responses(noise: Floats, steps: Floats, responses: Sequence[tup
 
 
 def moved_by_tilt(vectors: Floats) -> Floats:
-    """Matrices A of the products A·ψ = ψ × v of a tilt ψ with vectors v (..., 3), (..., 3, 3).
+    """Matrices A (..., 3, 3) with A·ψ = ψ × v for any tilt ψ, where v are the given vectors (..., 3).
 
-    For the specific force, the product is the acceleration error due to the tilt. For a lever arm, it is the
-    displacement of the arm's end.
+    If v is the specific force, A·ψ is the acceleration error due to the tilt. If v is a lever arm, A·ψ is the
+    displacement of its end.
     """
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)

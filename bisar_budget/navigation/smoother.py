@@ -2,21 +2,24 @@
 
 The errors of a navigation at two moments are correlated, and this correlation decides how an aperture is defocused.
 The covariance is computed without simulated flights. A Kalman filter runs over all fixes. After a fix, the error of
-the filter is e_k with the covariance P_k, and the next error is M_k·e_k plus noise that is new. Two errors of the
-filter therefore have the covariance
+the filter is e_k with the covariance P_k, and the next error is M_k·e_k plus new noise, which is independent of e_k.
+Two errors of the filter therefore have the covariance
 
     Cov(e_i, e_j) = P_i·Ψ(j, i)ᵀ,    Ψ(j, i) = M_{j−1} ⋯ M_i,    M_k = (1 − K_{k+1}·H)·Φ_k,    i ≤ j.
 
-A smoother subtracts from e_k what later fixes reveal of it, P_k·λ_k. The adjoint λ_k has the covariance Λ_k, which
-follows backwards from the last fix, Λ_k = M_kᵀ·Λ_{k+1}·M_k + (H·Φ_k)ᵀ·S⁻¹·H·Φ_k, and
+A smoother subtracts from e_k the part P_k·λ_k, which it learns from later fixes. The adjoint λ_k has the covariance
+Λ_k, which is computed backwards from the last fix: Λ_k = M_kᵀ·Λ_{k+1}·M_k + (H·Φ_k)ᵀ·S⁻¹·H·Φ_k. Two errors of the
+smoother have the covariance
 
     Cov(e_i − P_i·λ_i, e_j − P_j·λ_j) = P_i·Ψ(j, i)ᵀ·(1 − Λ_j·P_j).
 
-No covariance is inverted but that of the innovations, S. The adjoint form is that of Bryson and Frazier (1963); the
-covariance between two moments is derived here. `tests/navigation` compares it with a dense batch and with flights.
+The only covariance that is inverted is the covariance S of the innovations. The adjoint form is due to Bryson and
+Frazier (1963); the covariance between two moments was derived for this program. `tests/navigation` compares it with a
+dense batch solution and with simulated flights.
 
-Only integrals of the position error over the aperture are needed, so the sums over pairs of moments are carried along
-with Ψ, and the memory does not grow with the square of the number of moments.
+Only integrals of the position error over the aperture are needed. The sums over pairs of moments are therefore
+updated from each moment to the next, together with Ψ, so the memory does not grow with the square of the number of
+moments.
 """
 
 from collections.abc import Mapping
@@ -51,9 +54,9 @@ class StartSigmas:
     Attributes
     ----------
     position_m, velocity_mps, tilt_rad : float
-        Along each axis, and about each horizontal axis.
+        Errors of position [m] and velocity [m/s] along each axis, and tilt [rad] about each horizontal axis.
     heading_rad : (cases,)
-        Error of the heading.
+        Error of the heading. [rad]
     """
 
     position_m: float = 10.0
@@ -69,7 +72,7 @@ class FlightSteps:
     Attributes
     ----------
     body : (steps, cases, 3, 3)
-        Rotation from the axes of the body to those of the scene.
+        Rotation from the axes of the body to the axes of the scene.
     force : (steps, cases, 3)
         Specific force in the axes of the scene. [m/s²]
     arm : (moments, cases, 3), optional
@@ -81,7 +84,7 @@ class FlightSteps:
     arm: Floats | None = None
 
     def of(self, cases: slice) -> "FlightSteps":
-        """FlightSteps in some of the cases."""
+        """Select the steps of some cases."""
         arm = None if self.arm is None else self.arm[:, cases]
         return FlightSteps(body=self.body[:, cases], force=self.force[:, cases], arm=arm)
 
@@ -95,9 +98,9 @@ class AidedCovariance:
     of_orders : (orders, 3, orders, 3, cases)
         Covariance of the Legendre coefficients of the position error, for each order and axis east, north, up. [m²]
     beyond : (3, 3, cases)
-        Mean over the aperture of the covariance in higher orders. [m²]
+        Covariance of the part of the position error that belongs to higher orders, averaged over the aperture. [m²]
     at_middle : (states, states, cases)
-        Covariance of the state at mid-aperture, see `error_state`.
+        Covariance of the state at mid-aperture; `error_state` defines the state.
     fix_count : (cases,)
         Number of fixes during the flight.
     """
@@ -109,11 +112,11 @@ class AidedCovariance:
 
     @property
     def order_count(self) -> int:
-        """Number of Legendre orders."""
+        """Number of Legendre orders in `of_orders`."""
         return len(self.of_orders)
 
     def at(self, cases: Indices) -> "AidedCovariance":
-        """Covariance in a selection of the cases, by their indices."""
+        """Select the covariances of some cases by their indices."""
         return AidedCovariance(
             of_orders=self.of_orders[..., cases],
             beyond=self.beyond[..., cases],
@@ -147,13 +150,14 @@ def aided_covariance(
     flight : FlightSteps
         Attitude and specific force between these moments.
     unit, fixes, start
-        Sigmas of the inertial unit, of the fixes, and at the start of the flight.
+        Sigmas of the errors of the inertial unit and of the fixes, and of the errors at the start of the flight.
     half_s : (cases,)
-        Half the aperture time.
+        Half the aperture time. [s]
     order_count : int
         Number of Legendre orders of the result.
     is_smoothed : bool
-        Whether fixes after a moment contribute; otherwise the errors of the output of the filter are described.
+        Whether the position at each moment is also based on later fixes (smoother). Otherwise the covariance is
+        computed for the output of the filter.
     """
     steps, cases = timeline.steps.shape
     block = max(1, int(_STEP_MATRICES_BYTES / (steps * fixes.state_size**2 * 8 * 3)))
@@ -170,7 +174,7 @@ def aided_covariance(
 
 @dataclass(frozen=True)
 class _Navigation:
-    """A navigation in each case, as described in `aided_covariance`."""
+    """Aided navigations, one in each case; the fields are described in `aided_covariance`."""
 
     timeline: Timeline
     flight: FlightSteps
@@ -180,7 +184,7 @@ class _Navigation:
     half_s: Floats
 
     def of(self, cases: slice) -> "_Navigation":
-        """Navigation in some of the cases."""
+        """Select the navigations of some cases."""
         timeline = self.timeline
         return _Navigation(
             Timeline(
@@ -198,7 +202,7 @@ class _Navigation:
 
     @property
     def span(self) -> tuple[int, int]:
-        """Indices of the first and the last moment that a node or mid-aperture needs in any case."""
+        """Indices of the first and the last moment that is a node or mid-aperture in any of the cases."""
         nodes, middle = np.flatnonzero(self.timeline.weights.any(axis=1)), self.timeline.middle
         return int(min(nodes[0], middle.min())), int(max(nodes[-1], middle.max()))
 
@@ -244,7 +248,8 @@ def _filtered(navigation: _Navigation) -> _Filtered:
 def _unrevealed(filtered: _Filtered, span: tuple[int, int], *, is_smoothed: bool) -> dict[int, Floats]:
     """Matrix 1 − Λ·P at each moment of the aperture, by the index of the moment.
 
-    It is the share of an error that later fixes do not reveal; 1 for the output of a filter.
+    The matrix describes the part of an error that later fixes cannot correct. It is the identity matrix for the
+    output of a filter.
     """
     (first, last), count = span, len(filtered.propagation)
     identity = np.eye(filtered.information.shape[-1])
@@ -261,7 +266,7 @@ def _unrevealed(filtered: _Filtered, span: tuple[int, int], *, is_smoothed: bool
 
 
 def _integrals(navigation: _Navigation, order_count: int, *, is_smoothed: bool) -> tuple[Floats, Floats, Floats]:
-    """Fields `of_orders`, `beyond` and `at_middle` of `AidedCovariance`."""
+    """Compute the fields `of_orders`, `beyond` and `at_middle` of an `AidedCovariance`."""
     timeline, half, span = navigation.timeline, navigation.half_s, navigation.span
     filtered = _filtered(navigation)
     unrevealed = _unrevealed(filtered, span, is_smoothed=is_smoothed)
@@ -319,7 +324,8 @@ def _start_covariance(start: StartSigmas, unit: InertialUnit, fixes: Fixes) -> F
 def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Booleans) -> tuple[Floats, Floats, Floats]:
     """Covariance after a fix, the matrix 1 − K·H, and the information Hᵀ·S⁻¹·H of the fix.
 
-    Cases in which `is_taken` is false take a fix without information.
+    `P` is the covariance before the fix, and `measured` is the matrix H. In cases in which `is_taken` is false, the
+    fix has practically no effect, because its variances are set to a very large value.
     """
     R = np.where(is_taken[:, None], variances, _NO_FIX_SIGMA_M**2)
     seen = measured @ P
@@ -332,7 +338,7 @@ def _updated(P: Floats, measured: Floats, variances: Floats, is_taken: Booleans)
 
 
 def _antenna(navigation: _Navigation, moment: int) -> Floats:
-    """Matrix B of the position error B·e of the radar's antenna at a moment, (cases, 3, states).
+    """Matrix B (cases, 3, states) by which errors e of the state displace the radar's antenna by B·e at a moment.
 
     A tilt ψ moves the antenna by ψ × l, with the lever arm l.
     """

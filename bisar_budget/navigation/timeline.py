@@ -1,6 +1,6 @@
 """Timeline of an aided navigation: moments of the fixes, nodes over the aperture, and steps between them.
 
-The moments of one case form a column; shorter columns are padded by repetitions of their last moment.
+The moments of one case form a column; shorter columns are padded by repeating their last moment.
 """
 
 import math
@@ -11,9 +11,11 @@ import numpy as np
 
 from bisar_budget.arrays import Booleans, Floats, Indices
 
-_PIECE_NODE_COUNT = 2
-_FEWEST_PIECE_COUNT = 12  # of an aperture
-_MOST_SMOOTHED_PIECE_COUNT = 128  # a smoothed error has no jumps, so its pieces need not end at the fixes
+# Nodes over an aperture. Integrals of products of two Legendre polynomials of up to order 23 must be exact, or a
+# constant error would leak into every order.
+_FEWEST_SMOOTHED_NODE_COUNT, _MOST_SMOOTHED_NODE_COUNT = 48, 256
+_FEWEST_PIECE_COUNT, _FEWEST_FILTERED_NODE_COUNT = 12, 72
+_FEW_PIECE_COUNT, _NODES_OF_FEW_COUNT, _NODES_OF_MANY_COUNT = 100, 4, 2  # nodes in each of few, and of many pieces
 _COINCIDENCE_S = 1e-9  # moments that are closer are one moment
 
 
@@ -24,17 +26,17 @@ class FixSchedule:
     Attributes
     ----------
     half_s : float
-        Half the aperture time.
+        Half the aperture time. [s]
     before_s, after_s : float
-        Duration of the flight before and after the aperture whose fixes are used.
+        Durations of the flight before and after the aperture from which fixes are used. [s]
     rate_hz : float
-        Rate of the fixes; one of them is at mid-aperture.
+        Rate of the fixes [Hz]. Without outages, there is a fix at mid-aperture.
     outages : sequence of (float, float)
         Intervals without fixes, relative to mid-aperture, both ends included. [s]
     turning_step_s : float
-        Longest step between two moments within the aperture, where the path turns.
+        Longest step between two moments within the aperture, which has to resolve turns of the path. [s]
     outer_step_s : float
-        Longest step between two moments outside the aperture.
+        Longest step between two moments outside the aperture. [s]
     is_smoothed : bool
         Whether fixes after a moment contribute to the position at this moment.
     """
@@ -49,7 +51,10 @@ class FixSchedule:
     is_smoothed: bool = True
 
     def fixes(self) -> Floats:
-        """Times of the fixes: multiples of 1/rate from mid-aperture, both ends of the flight included. [s]"""
+        """Times of the fixes relative to mid-aperture: multiples of 1/rate, except during outages. [s]
+
+        A fix at the first or the last time of the flight is included.
+        """
         first = math.ceil((-self.half_s - self.before_s) * self.rate_hz - _COINCIDENCE_S)
         last = math.floor((self.half_s + self.after_s) * self.rate_hz + _COINCIDENCE_S)
         times = np.arange(first, last + 1) / self.rate_hz
@@ -58,18 +63,23 @@ class FixSchedule:
         return times
 
     def nodes(self) -> tuple[Floats, Floats]:
-        """Nodes over the aperture [s] and weights whose sum is 1: Gauss–Legendre quadrature, piece by piece.
+        """Nodes over the aperture [s] and weights whose sum is 1, by Gauss–Legendre quadrature.
 
-        The error of a filter jumps at each fix, so a piece does not extend over a fix. A smoothed error has no jumps.
+        The error of a filter jumps at each fix, so it is integrated piece by piece, and no piece extends over a fix.
+        A smoothed error has no jumps.
         """
-        fewest = np.linspace(-self.half_s, self.half_s, _FEWEST_PIECE_COUNT + 1)
         fixes = self.fixes()
         inner = fixes[np.abs(fixes) < self.half_s - _COINCIDENCE_S]
-        if self.is_smoothed and inner.size > _MOST_SMOOTHED_PIECE_COUNT:
-            edges = np.linspace(-self.half_s, self.half_s, _MOST_SMOOTHED_PIECE_COUNT + 1)
+        if self.is_smoothed:
+            edges, fewest = np.array((-self.half_s, self.half_s)), 2 * (inner.size + 1)
+            count = min(max(fewest, _FEWEST_SMOOTHED_NODE_COUNT), _MOST_SMOOTHED_NODE_COUNT)
         else:
-            edges = _distinct(np.concatenate((fewest, inner)))
-        abscissas, weights = np.polynomial.legendre.leggauss(_PIECE_NODE_COUNT)
+            ends = -self.half_s * np.cos(np.linspace(0.0, np.pi, _FEWEST_PIECE_COUNT + 1))  # closer near the ends
+            edges = _distinct(np.concatenate((ends, inner)))
+            pieces = edges.size - 1
+            fewest = _NODES_OF_FEW_COUNT if pieces < _FEW_PIECE_COUNT else _NODES_OF_MANY_COUNT
+            count = max(fewest, -(-_FEWEST_FILTERED_NODE_COUNT // pieces))
+        abscissas, weights = np.polynomial.legendre.leggauss(count)
         middles, halves = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
         times = middles[:, None] + halves[:, None] * abscissas
         return times.ravel(), (halves[:, None] * weights / (2 * self.half_s)).ravel()
@@ -86,9 +96,9 @@ class Timeline:
     is_fix : (moments, cases)
         Whether a fix is taken at the moment.
     weights : (moments, cases)
-        Weights of a mean over the aperture; 0 outside the nodes.
+        Weights of a mean over the aperture; 0 for moments that are not nodes.
     middle : (cases,)
-        Index of the moment of mid-aperture.
+        Index of the moment that is mid-aperture.
     """
 
     times: Floats
@@ -134,7 +144,10 @@ def _column(schedule: FixSchedule) -> tuple[Floats, Booleans, Floats]:
 
 
 def _divided(moments: Floats, half: float, inner: float, outer: float) -> Floats:
-    """Divide the steps between moments into equal parts that are no longer than `inner` or `outer`. [s]"""
+    """Divide each step between two moments into equal parts of limited duration, and return all moments. [s]
+
+    The limit is `inner` [s] within the aperture, and `outer` [s] before and after it.
+    """
     steps, is_inner = np.diff(moments), np.abs(moments[1:] + moments[:-1]) < 2 * half
     counts = np.maximum(1, np.ceil(steps / np.where(is_inner, inner, outer) - _COINCIDENCE_S)).astype(int)
     if np.all(counts == 1):
@@ -146,7 +159,7 @@ def _divided(moments: Floats, half: float, inner: float, outer: float) -> Floats
 
 
 def _distinct(moments: Floats) -> Floats:
-    """Sort moments, and drop those that coincide with an earlier one."""
+    """Sort moments, and drop each moment that coincides with an earlier moment."""
     ascending = np.sort(moments)
     return ascending[np.concatenate(([True], np.diff(ascending) > _COINCIDENCE_S))]
 

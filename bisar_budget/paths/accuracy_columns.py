@@ -107,11 +107,11 @@ _COLUMN_SPELLINGS = (
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
     """Find out from the name and unit of a column which accuracy it states; return the standard name and unit.
 
-    Standard names are `sigma_east`, `variance_east` and the same for other axes, `horizontal_accuracy`,
-    `vertical_accuracy`, and `position_accuracy` for an accuracy without a direction. The name is `sigma_h` if h may
-    mean height or horizontal, which is decided later from the other columns. It is `CROSS_COVARIANCE` for a
-    covariance of two axes, `UNCLEAR` for an unknown accuracy, and None for a column that does not state the accuracy
-    of a position.
+    Standard names are `sigma_east` and `variance_east`, the corresponding names for other axes,
+    `horizontal_accuracy`, `vertical_accuracy`, and `position_accuracy` for an accuracy without a direction. The name
+    is `sigma_h` if h may mean height or horizontal, which is decided later from the other columns. It is
+    `CROSS_COVARIANCE` for a covariance of two axes, `UNCLEAR` for an unknown accuracy, and None for a column that
+    does not state the accuracy of a position.
 
     The returned unit is `unit`, or else the unit at the end of the column's name, or None.
     """

@@ -153,9 +153,10 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 
     Positions from SGP4 have rounding steps, which grow with the time from the epoch of the elements. SGP4 counts
     minutes and angles from the epoch, so a position is rounded to 2e-6 m a week from the epoch, and to 4e-5 m 100
-    days from the epoch. A polynomial of slow time would follow these steps, and so curve the path. Instead,
-    Lagrange's polynomial goes through eight positions 30 s apart. Its error in a low orbit is 1e-8 m, from its
-    remainder term. It also smooths the jumps of a few millimetres that SGP4 makes every half day in resonant orbits.
+    days from the epoch. A polynomial of slow time would follow these steps, which would give the path a false
+    curvature. Instead, Lagrange's polynomial goes through eight positions 30 s apart. Its error in a low orbit is
+    1e-8 m according to its remainder term. It also smooths the jumps of a few millimetres that SGP4 makes every half
+    day in resonant orbits.
     """
 
     @lru_cache(maxsize=64)

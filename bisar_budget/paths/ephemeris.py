@@ -108,9 +108,10 @@ def orbit_through(
 ) -> Orbit:
     """Orbit of an object through the segment that contains the middle of the aperture.
 
-    If there are several such segments, the segment whose nearer end is farthest from the middle is used for all
-    instants. The error of the interpolation is estimated as its distance from a polynomial whose degree is higher by
-    two. An error of 1 m or more causes a warning in `Orbit.doubts`.
+    If several segments contain it, the time from the middle to the nearer end of each segment is compared. The
+    segment with the longest time is used for all instants. The error of the interpolation is estimated by increasing
+    the degree of the polynomial by two; the distance between the two polynomials is the estimate. An error of 1 m or
+    more causes a warning in `Orbit.doubts`.
 
     `segments` are the segments of a file. The other arguments are the same as for `OrbitFormat.read`. Raises
     `PathFileError` if several objects are possible, if the file has no position at `center`, or if the samples around
@@ -248,10 +249,10 @@ def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, In
 def _error_around(samples: Sequence[Sample], time: Instant, interpolation: Interpolation) -> float:
     """Estimated error of an interpolation near a time. [m]
 
-    The interpolation is compared with the polynomial whose degree is higher by two. The result is the larger of their
-    distances at the time itself and midway between the samples around it. If there are too few samples for this
-    polynomial, the interpolation is compared with the polynomial whose degree is lower by two. If there are too few
-    samples for that as well, the result is infinite.
+    If the degree of the interpolation is n, it is compared with the polynomial of degree n + 2. The result is the
+    larger of their distances at the time itself and midway between the two samples around this time. If there are too
+    few samples for degree n + 2, the interpolation is compared with the polynomial of degree n − 2. If this is not
+    possible either, the result is infinite.
     """
     step = 1 if interpolation.is_hermite else 2
     nodes, is_hermite = interpolation.nodes, interpolation.is_hermite
@@ -280,7 +281,8 @@ def _fitting(samples: Sequence[Sample], center: Instant) -> Interpolation:
 def _segment_at(segments: Sequence[Segment], name: str, center: Instant) -> Segment:
     """Segment that contains the instant `center`.
 
-    If several segments contain it, the segment whose nearer end is farthest from the instant is used.
+    If several segments contain it, the time from the instant to the nearer end of each segment is compared, and the
+    segment with the longest time is used.
     """
     time = tai(center)
     useable = [segment for segment in segments if segment.is_useable(time)]

@@ -76,8 +76,8 @@ class SmoothingSettings:
         If the error of the path due to noise is below this value [m], longer stretches are not tried. Such an error
         is negligible at any carrier frequency.
     chance_factor : float
-        The squared difference of two fits counts as noise up to this factor times the square that noise alone is
-        expected to cause.
+        The squared difference between two fits is attributed to noise up to this factor times the value that noise
+        alone would cause on average.
     hopeless_ratio : float
         Longer stretches are not tried if the squared predicted error is more than this ratio times its smallest value
         so far.
@@ -85,8 +85,8 @@ class SmoothingSettings:
         The fit of a longer stretch is rejected if the residual in the aperture grows by more than this ratio, because
         the fit then does not follow the path.
     stray_ratio, min_stray_m : float
-        A warning names a fix whose residual is larger than `stray_ratio` times the median residual plus
-        `min_stray_m` [m]. The noise of thousands of fixes reaches a ratio of 4.
+        A warning names a fix whose residual is larger than the sum of two terms: `stray_ratio` times the median
+        residual, and `min_stray_m` [m]. Among thousands of fixes, noise alone causes ratios of up to 4.
     """
 
     min_fixes: int = 5
@@ -219,10 +219,10 @@ class Orbit:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """The m unusable records of a log.
+    """Unusable records of a log.
 
-    `before` (m,) is the number of usable records that precede each unusable record. `faults` are messages about the
-    unusable records.
+    `before` (m,) is the number of usable records that precede each of the m unusable records. `faults` are messages
+    about the unusable records.
     """
 
     before: NDArray[np.int64]
@@ -385,7 +385,8 @@ class _SmoothFit:
     residuals : (n, 3)
         Positions of the fixes minus the path. [m]
     independent : float
-        Number of independent fixes that would contain the same information as the correlated fixes.
+        Effective number of fixes: the number of independent fixes that would carry as much information as the actual
+        fixes, whose errors are correlated.
     root : (coefficients, coefficients)
         Matrix whose product with its transpose is the covariance of the coefficients for white noise of variance 1.
     spline : SplineFit, optional
@@ -470,8 +471,8 @@ class _SmoothFit:
     def noise(self, times: Floats, left_out: Floats) -> float:
         """Mean square of the path error due to noise of the fixes, over slow times (m,). [m²]
 
-        `left_out` (m, m) is a projection, for example onto straight lines. The part of the error onto which it
-        projects is excluded.
+        `left_out` (m, m) is a projection matrix. It selects the part of the error that is excluded, for example the
+        straight line that fits the error best.
         """
         basis = self.basis(times)
         basis = basis - left_out @ basis
@@ -523,7 +524,8 @@ def _information(residuals: Floats, coefficients: int, independent: float) -> fl
 
     Each axis has its own noise variance, and the same number of coefficients. The criterion is corrected for
     overfitting as in AICc (Hurvich & Tsai 1989), because a path with many coefficients fits a small number of fixes
-    too well by chance. `independent` is the number of independent fixes with the same information.
+    too well by chance. `independent` is the effective number of fixes: the number of independent fixes that would
+    carry as much information as the actual, correlated fixes.
     """
     count, squares = len(residuals), (residuals**2).mean(axis=0) + _ROUNDING_M**2
     cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
@@ -587,11 +589,11 @@ def _widened(
     A stretch is a time span around mid-aperture. Returns its fit, and the error ratio: the squared predicted error
     divided by the squared error due to noise.
 
-    A longer stretch averages more noise: the acceleration of a parabola through n fixes of noise σ over the time T
-    has an error of σ√(720/(n·T⁴)). But a longer stretch may smear the motion of the platform. The smear is unknown,
-    and is estimated from the distance between the path and the paths of shorter stretches. The expected square of
-    this distance is the square of the smear plus the squared noise that the longer stretch avoids. The excess over
-    that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
+    A longer stretch averages the noise over more fixes: the acceleration of a parabola through n fixes of noise σ
+    over the time T has an error of σ√(720/(n·T⁴)). But a longer stretch may smear the motion of the platform. The
+    smear is unknown, and is estimated from the distance between the path and the paths of shorter stretches. The
+    expected square of this distance is the square of the smear plus the squared noise that the longer stretch avoids.
+    The excess over that noise counts as smear (rule of Goldenshluger & Lepski 2011; Lepski 1991).
 
     Only the part of the error that is not linear in slow time is minimised, because only this part defocuses the
     image. In addition, the error of the whole path and the residual in the aperture must not grow.
@@ -843,8 +845,8 @@ def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | Non
 def dated(log: Log, center: Instant | None) -> Log:
     """Add a date to a log that has only times of day.
 
-    The date is chosen so that the log is as close as possible to `center`, the middle of the aperture. If `center` is
-    None, or if the log has dates or is of another kind, it is returned unchanged.
+    The date is chosen so that the log is as close as possible to `center`, the middle of the aperture. The log
+    is returned unchanged if `center` is None, if the log has dates, or if its times are not times of day.
     """
     if log.clock != "day" or log.start is not None or center is None:
         return log

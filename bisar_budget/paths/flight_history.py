@@ -11,9 +11,10 @@ _POLYNOMIAL_ORDER_COUNT = 3  # constant, velocity, acceleration
 
 
 class FlightHistory:
-    """Velocity of a platform at times of its log, which is interpolated linearly.
+    """Velocity of a platform during its logged flight, interpolated linearly between given times.
 
-    Two histories are equal only if they are the same object, so that the cases of a sweep can share one.
+    Histories are compared by identity, not by value. Cases of a sweep that share a history object therefore have
+    equal histories.
 
     Parameters
     ----------
@@ -27,14 +28,18 @@ class FlightHistory:
         self.times, self.velocities = times, velocities
 
     def at(self, times: Floats) -> Floats:
-        """Velocities at slow times (...), (3, ...). [m/s] Before and after the log, the flight is straight."""
+        """Velocities (3, ...) [m/s] at slow times (...) [s].
+
+        Before the first and after the last time of the history, the velocity is constant.
+        """
         return np.array([np.interp(times, self.times, component) for component in self.velocities.T])
 
 
 def history_of(times: Floats, positions: Floats, start: float, end: float) -> FlightHistory | None:
-    """History of the fixes of a log from `start` to `end` [s]; None if the log has too few fixes there.
+    """Compute the velocities of a flight from the fixes of its log; None if the log has too few fixes.
 
-    At each time of the history, a parabola is fitted to the fixes within a second, or to the nearest fixes.
+    At each time of the history, a parabola is fitted to the fixes that are less than a second away. If there are too
+    few such fixes, it is fitted to the nearest fixes. The slope of the parabola is the velocity.
 
     Parameters
     ----------
@@ -43,7 +48,7 @@ def history_of(times: Floats, positions: Floats, start: float, end: float) -> Fl
     positions : (n, 3)
         Positions of the fixes, east, north, up. [m]
     start, end : float
-        Times of the flight that is needed. [s]
+        First and last slow time for which velocities are needed. [s]
     """
     first, last = max(start, float(times[0])), min(end, float(times[-1]))
     if last - first < _STEP_S or np.count_nonzero((times >= first) & (times <= last)) < _FEWEST_FIXES_COUNT:

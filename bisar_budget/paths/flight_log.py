@@ -135,7 +135,7 @@ class _Header:
 
     @property
     def columns(self) -> tuple[_Column, ...]:
-        """All columns of a `_Table` in order: `numbers`, followed by `accuracy`."""
+        """All columns in the order in which a `_Table` stores them: `numbers`, followed by `accuracy`."""
         return (*self.numbers, *self.accuracy)
 
     @property
@@ -175,7 +175,7 @@ def is_csv(data: bytes) -> bool:
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NO_KEYS) -> Log:
-    """Read a flight log in UTF-8 of at most `MAX_CSV_BYTES` bytes.
+    """Read a CSV flight log, a file in UTF-8 with at most `MAX_CSV_BYTES` bytes.
 
     The arguments and errors are the same for all readers; see `LogFormat.read`. Geodetic positions are
     converted to Earth-fixed positions, and time stamps to seconds after the first time stamp.
@@ -214,7 +214,7 @@ def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple
 
     The rows of a plain log are unchanged. In a log from a known exporter, rows without a fix are dropped, as are rows
     of receivers that are not chosen. Raises `PathFileError` if no row has a fix, if there are several receivers and
-    the mission file does not choose one, or if it chooses one and the log has no column of receivers.
+    the mission file does not choose one, or if it chooses a receiver although the log has no column of receivers.
     """
     receiver = header.index_of("receiver")
     if keys.instance is not None and receiver is None:
@@ -293,9 +293,9 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
     """Convert the times of a fine clock to UTC, using time stamps from a second clock that writes whole seconds.
 
     `counted_s` are the times of the fine clock [s], and `instants` are the time stamps, truncated to whole seconds
-    [s]. The fine clock was zero at an unknown time in UTC. In each row, the stamp minus the fine time is at most this
-    unknown time, and is less than 1 s before it. All rows together bound the unknown time, and the midpoint of the
-    bounds is used. Returns the times since the first row [s], the instant of the first row, and a note on the
+    [s]. The fine clock was zero at an unknown time in UTC. In each row, the stamp minus the fine time is either equal
+    to this unknown time, or earlier by less than 1 s. All rows together bound the unknown time, and the midpoint of
+    the bounds is used. Returns the times since the first row [s], the instant of the first row, and a note on the
     accuracy of UTC. Raises `PathFileError` if there is no stamp, or if the clocks drift apart.
     """
     has_instant = np.isfinite(instants) & records.is_usable
@@ -372,9 +372,10 @@ def _positions(table: _Table, header: _Header, records: LogRecords, keys: LogKey
 
 
 def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
-    """Convert coordinates (3, n) to positions (n, 3). [m]
+    """Convert coordinates (3, n) to positions (n, 3) [m].
 
-    Geodetic coordinates become Earth-fixed positions; `x`, `y`, `z` and `east`, `north`, `up` keep their axes.
+    Geodetic coordinates are converted to Earth-fixed positions. An array of `x`, `y`, `z` or `east`, `north`,
+    `up` is only transposed.
     """
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
@@ -828,10 +829,10 @@ def _or_nan(cell: str) -> float:
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
-    """Split time stamps into the start of the minute, in seconds from MJD 0, and the seconds in the minute. [s]
+    """Split time stamps into the start of the minute [s], counted from MJD 0, and the time within the minute [s].
 
-    If the exporter omits a time stamp, the start is NaN and the seconds are 0. Returns None if a string is not a time
-    stamp.
+    If the exporter omits a time stamp, the start is NaN and the time within the minute is 0. Returns None if a string
+    is not a time stamp.
     """
     has_text = [bool(text) or header.vendor is None for text in texts]
     minutes = [_minute(text[:17]) if is_stated else math.nan for text, is_stated in zip(texts, has_text, strict=True)]

@@ -38,8 +38,8 @@ class FreeFall:
         Inertial rotation rate of the axes, along the Earth's axis [rad/s]. It is zero for a scene without a position
         on the Earth; the Earth is then a sphere.
     share : float or (cases,)
-        1 in cases in which the platform is in free fall, and 0 in all other cases. If it is 0, the position error is
-        p + vτ + aτ²/2, without gravity and rotation.
+        1 in cases in which the platform is in free fall, and 0 in all other cases. If it is 0, errors p, v and a of
+        position, velocity and acceleration cause the position error p + vτ + aτ²/2, without gravity and rotation.
     """
 
     centre: Vectors
@@ -70,7 +70,8 @@ class FreeFall:
         -----
         The method was derived for this program. In axes that rotate at the rate ω, δr̈ = Gδr − ω×(ω×δr) − 2ω×δṙ + a
         with the gravity gradient G. The acceleration δr̈ is approximated by a polynomial that satisfies the equation
-        at Gauss-Legendre nodes. Its values at the nodes are the solution of a linear system for each case.
+        at Gauss-Legendre nodes. The values of the polynomial at the nodes are found from a linear system for each
+        case.
         """
         collocation = _collocation()
         cases, count = half.size, collocation.times.size
@@ -146,7 +147,7 @@ class FreeFall:
         return (a / square, b / square, c / square)
 
     def of(self, cases: Any) -> "FreeFall":
-        """Select the dynamics for some cases by their indices `cases`."""
+        """Select the dynamics of the cases with the indices `cases`."""
 
         def chosen(number: PerCase) -> PerCase:
             return number[cases] if isinstance(number, np.ndarray) and number.ndim else number
@@ -198,7 +199,7 @@ def departure_of(path: PlatformState, axes: SceneAxes | None) -> tuple[PerCase, 
 
 @dataclass(frozen=True, eq=False)
 class _Collocation:
-    """N Gauss-Legendre nodes from -1 to 1, and matrices (N, N) to integrate a function from its values at the nodes.
+    """N Gauss-Legendre nodes from -1 to 1, and matrices (N, N) that integrate a function given by its values there.
 
     `times` (N,) are the nodes. Multiplied by the values of the function, `once` and `twice` give its single and
     double integrals from 0 to each node. `to_coefficients` gives the Legendre coefficients of the polynomial through

@@ -31,8 +31,8 @@ class LogKeys(NamedTuple):
     """Keys of a mission file that describe a log.
 
     `week` is the GPS week in which the log begins. `time_scale` is the time scale of its time stamps.
-    `geoid_separation` [m] is the height of the geoid above the ellipsoid. If a file contains several logs, one of
-    them is chosen by the `talker` in NMEA, by the `track` in GPX (name or number), or by the `instance` of a
+    `geoid_separation` [m] is the height of the geoid above the ellipsoid. If a file contains several logs, a
+    key chooses one of them: `talker` for NMEA, `track` for GPX (name or number), or `instance`, the number of a
     receiver. None means that the mission file does not state the key.
     """
 
@@ -54,15 +54,15 @@ _NO_FAULTS: Mapping[int, str] = MappingProxyType({})
 
 
 def most_left_out(count: int) -> int:
-    """Largest number of records that may be left out of a log: 1 % of them, or one record if the log has 20 to 199.
+    """Largest number of records that may be left out of a log with `count` records.
 
-    `count` is the number of records in the log.
+    This is 1 % of the records, rounded down, but at least one record if the log has 20 records or more.
     """
     return max(count // _RECORDS_PER_FAULT, int(count >= _ONE_FAULT_RECORD_COUNT))
 
 
 class LogRecords:
-    """Records of a log that have a fix, and which of them can be used.
+    """Records of a log that have a fix, divided into usable and unusable records.
 
     A record is identified in messages by its line, or by its number.
 
@@ -75,8 +75,7 @@ class LogRecords:
     lines : (count,) array_like, optional
         Lines of the records in the file, in ascending order. If omitted, records are numbered from 1.
     broken : mapping, optional
-        Messages about records that cannot be read, by their lines or numbers. These are not among the `count`
-        records.
+        Messages about records that cannot be read, by line or number. Such records are not included in `count`.
     lost : int
         Number of records that are missing, because they were damaged during recording or transfer.
 
@@ -499,12 +498,12 @@ _MEDIAN_MARGIN_SAMPLES = 10  # samples beyond each end of the aperture that coun
 
 
 def hold_to_motion(times: Floats, positions: Floats, stretch_s: float, name: str) -> None:
-    """Refuse a log whose fixes near the aperture cannot be the motion of a platform.
+    """Refuse a log whose fixes near the aperture cannot result from the motion of a platform.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Slow times, in ascending order; fixes far outside the time span that is used are ignored. [s]
+        Slow times of the fixes, in ascending order; fixes far outside the time span of `stretch_s` are ignored. [s]
     positions : (n, 3) ndarray
         Positions of the fixes in any axes. [m]
     stretch_s : float

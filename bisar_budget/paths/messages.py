@@ -78,8 +78,8 @@ def number_in(text: object) -> float | None:
 def coordinate_in(text: str, location: str, requirement: str) -> float:
     """Read a coordinate of a position or velocity from a string.
 
-    Raises `PathFileError` if the string is not a number, or if its magnitude exceeds 1e9. `requirement` is the text
-    of this error.
+    Raises `PathFileError` if the string is not a number, or if its magnitude exceeds 1e9. `requirement` describes
+    the accepted numbers in the error message.
     """
     number = number_in(text)
     if number is None or abs(number) > _MAX_COORDINATE_LEVEL:

@@ -179,7 +179,7 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
 
 @dataclass(eq=False)
 class _Sentences:
-    """Content of all sentences that are used from a log.
+    """Content of all sentences of a log that are used.
 
     A talker is named by the first two letters of a sentence. Fixes are grouped by talker and kind of sentence; dates,
     accuracies and datums are grouped by talker. Dates and datums are stored with their lines. `broken` contains

@@ -237,7 +237,7 @@ def read_covariance(
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
-    """Text for reports on an interpolation or a degree that a message does not state; empty if it states both."""
+    """Remark for reports if a message does not state the interpolation or its degree; empty if it states both."""
     kind, degree = (metadata.get(key, (0, ""))[1].upper() for key in ("INTERPOLATION", "INTERPOLATION_DEGREE"))
     if not kind:
         return " (the file states no interpolation)"

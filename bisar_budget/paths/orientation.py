@@ -119,7 +119,7 @@ def sidereal_time(ut1: Instant) -> float:
 def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
     """Return a function that converts positions from celestial to Earth-fixed axes.
 
-    The celestial axes are the axes of the GCRF, or the mean equator and equinox of J2000 if `is_j2000` is set.
+    The celestial axes are the axes of the GCRF or, if `is_j2000` is set, of the mean equator and equinox of J2000.
 
     Precession follows the IAU 2006 model, and nutation the IAU 2000A model (IERS Conventions 2010, chapter 5). The
     axes of J2000 differ from the axes of the GCRF by 0.023", which is 0.8 m at the distance of a low orbit. If a file
@@ -264,7 +264,7 @@ _MAX_HEADER_LINES = 40  # lines of text above the rows of C04
 
 
 def _unreadable_table(text: str) -> str | None:
-    """Name the format of an Earth rotation table that is recognised but not supported, for a message.
+    """Name, for a message, of the format of an Earth rotation table that is recognised but not supported.
 
     Returns None for any other text.
     """

@@ -35,9 +35,9 @@ class OrbitFormat(NamedTuple):
     read : callable
         Reader. Its arguments are the bytes of a file, the name of the file in messages, the name of the object
         (needed if there are several), the middle of the aperture, and the orientation of the Earth, which is used to
-        convert celestial axes to Earth-fixed axes. Returns an `Orbit`. Raises `PathFileError` if the file breaks its
-        format, if it has several objects and no name is given, if it has no object with the given name, or if it has
-        no position at the middle of the aperture.
+        convert celestial axes to Earth-fixed axes. Returns an `Orbit`. Raises `PathFileError` if the file violates
+        the format, if it has several objects and no name is given, if it has no object with the given name, or if it
+        has no position at the middle of the aperture.
     """
 
     words: str
@@ -131,7 +131,8 @@ def _words_of_logs() -> str:
 def _refuse(data: bytes, name: str, actual: str | None, accepted: str) -> None:
     """Refuse a file that is an orbit in the format `actual`, or that has a known but unsupported format.
 
-    `actual` is a key of `ORBIT_FORMATS`, or None if the file is not an orbit. `accepted` describes what is accepted.
+    `actual` is a key of `ORBIT_FORMATS`, or None if the file is not an orbit. `accepted` describes the accepted
+    files.
     """
     if actual is not None:
         key = f"orbit: {{{actual}: …}} reads it"
@@ -180,7 +181,8 @@ class LogFormat(NamedTuple):
         Function that tests whether bytes are a file in this format.
     read : callable
         Reader. Its arguments are the bytes of a file, the name of the file in messages, and the keys of the mission
-        file about the log. Returns a `Log`. Raises `PathFileError` with the line, byte or record of a fault.
+        file about the log. Returns a `Log`. Raises `PathFileError` if the file has a fault; the message states the
+        line, byte or record.
     """
 
     words: str

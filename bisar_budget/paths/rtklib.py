@@ -64,7 +64,7 @@ class _Columns(NamedTuple):
     delimiter : str
         Character between cells; empty for blanks.
     indices : dict
-        Index of the cell of each column by the column's name. The first two cells of a line are the time.
+        Index of the cell of each column, by column name. The first two cells of a line are the time.
     width : int
         Number of cells in a line.
     is_in_minutes : bool
@@ -84,10 +84,10 @@ def is_solution(data: bytes) -> bool:
 
 
 def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the fixes in a solution of RTKLIB of at most `MAX_SOLUTION_BYTES` bytes.
+    """Read the fixes from a solution of RTKLIB, a file of at most `MAX_SOLUTION_BYTES` bytes.
 
-    Arguments and errors are the same for all readers, see `LogFormat.read`. The log has standard deviations of
-    each fix east, north and up, unless they are missing or all zero in the file.
+    Arguments and errors are the same for all readers, see `LogFormat.read`. The log has the standard deviations east,
+    north and up of each fix, unless they are missing or all zero in the file.
     """
     hold_to_bytes(data, MAX_SOLUTION_BYTES, name)
     header: _Columns | None = None

@@ -77,7 +77,7 @@ class _Kind(NamedTuple):
         Fields of a record that are checked. Each entry has the name of a field, its index in the record, its smallest
         and largest value, and its unit.
     nonzero_fields : int
-        Number of fields at the beginning of a record, of which at least one is not zero in a usable record.
+        Number of fields at the beginning of a record that are not all zero in a usable record.
     """
 
     words: str
@@ -99,7 +99,7 @@ _SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SMRMSG_FIELDS, 4)
 class Accuracy:
     """One-sigma errors of position [m] and velocity [m/s], east, north and up.
 
-    Each error is the maximum over several records. The number of these records is `records`.
+    Each error is the maximum over several records; `records` is their number.
     """
 
     position: Vector

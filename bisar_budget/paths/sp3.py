@@ -55,7 +55,7 @@ class _Satellite:
     lines : list of int
         Line of the file in which each sample is written.
     deviations : list of Vector or None
-        Standard deviations of the position of each sample; None if the file states none. [m]
+        Standard deviations of the position of each sample; None if the file does not state them. [m]
     breaks : set of int
         Indices of samples that directly follow a manoeuvre or a missing position.
     predicted : Instant, optional
@@ -103,7 +103,10 @@ def read_sp3(
 
 
 def _first_of(broken: Mapping[int, str]) -> str:
-    """Error message for unusable lines: the fault in the first line, and the number of lines if there are several."""
+    """Error message for unusable lines.
+
+    It states the fault in the first of these lines, and the number of lines if there are several.
+    """
     problem = broken[min(broken)]
     return problem if len(broken) == 1 else f"{problem}; {len(broken)} lines cannot be used"
 
@@ -247,7 +250,7 @@ def _satellites(
 
 
 def _epoch_after(line: str, last_epoch: Instant | None, system: str, location: str) -> Instant:
-    """Read the time of an epoch, in TAI; refuse an epoch that is not later than the last epoch."""
+    """Read the time of an epoch, in TAI; refuse an epoch that is not later than `last_epoch`."""
     time = _epoch(line, system, location)
     if last_epoch is not None and time.since(last_epoch) < MIN_SAMPLE_STEP_S:
         raise PathFileError(f"{location}: the epoch is not after the one before it; epochs must rise")

@@ -68,7 +68,7 @@ def air_stays_untaken(
     """Sentence for atmospheric delays assumed constant over a long aperture, if no requirement limits their changes.
 
     `aperture_time` and `correlation_time` are in s. `size` is the effect that changing delays would have, in the unit
-    of the effect. The file needs either the keys `keys`, or a requirement from `lines`.
+    of the effect. The sentence proposes to add either `keys` to the file, or a requirement from `lines`.
     """
     added = " or ".join(f"`{line}`" for line in lines)
     return (
@@ -79,7 +79,7 @@ def air_stays_untaken(
 
 @composed
 def below_the_ionosphere(platform: str) -> str:
-    """Sentence for a platform below the ionosphere, so that the electron content does not delay its signal."""
+    """Sentence for a platform below the ionosphere; the electron content does not delay its signal."""
     if platform == "mission":
         return "both platforms fly below the ionosphere: no electrons on their legs"
     return f"the {platform} flies below the ionosphere: no electrons on its leg"

@@ -104,7 +104,12 @@ def echoes_measured(who: str, cycles: float, smear_cells: float | None, is_assum
 
 @composed
 def sigma_of_time_series(draws: int, factor: float, images: int, bound_by: str) -> str:
-    """Sentence for an image verdict on a random error: its simulated time series, and the uncertainty of sigma."""
+    """Sentence for an image verdict on a random error that is simulated by time series.
+
+    It states the number `draws` of simulated time series, and the uncertainty of the standard deviation that is
+    computed from them. `factor` is the coverage factor, and `images` the number of time series for which images are
+    formed. `bound_by` names the effect that limits the error; it may be empty.
+    """
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
     bound = f", bound by the {bound_by}" if bound_by else ""
     known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws

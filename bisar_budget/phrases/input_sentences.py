@@ -104,7 +104,7 @@ def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> s
 
 @composed
 def input_usually_has_more(error: StatedError) -> str:
-    """Sentence for a declared error that is less than a third of the usual error of this kind of flight log."""
+    """Sentence for a flight log whose declared error is less than a third of the usual error of such logs."""
     return (
         f"{error.words} usually have an error of {size_words(max(error.stated), error.unit)} on each axis,"
         f" but {error.declared_words}: declare at least a third of the usual error in {error.key}"

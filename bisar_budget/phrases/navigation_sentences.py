@@ -26,8 +26,7 @@ NAVIGATION_SENTENCES: dict[str, str] = {
         "{aided:rad}: use navigation"
     ),
     "position-and-velocity-contradict": (
-        "platforms.{platform}.motion_error: a position sigma of {position:m} and a velocity sigma of {velocity:m/s}, "
-        "which makes {way:m} in {half:s}, half an aperture, cannot both hold at every moment: one of them is that of "
-        "single fixes; use navigation"
+        "{platforms:and platforms.*.motion_error}: sigmas of {position:m} and {velocity:m/s} contradict each other, "
+        "{way:m} in half an aperture: use navigation"
     ),
 }

@@ -39,7 +39,7 @@ def _items(value: object) -> list[str]:
 
 
 def size_words(size: float, unit: str) -> str:
-    """Text with a magnitude and its unit. A length has an SI prefix; other quantities, such as phases, have none."""
+    """Text with a magnitude and its unit. A length gets an SI prefix; other quantities, such as phases, do not."""
     if not math.isfinite(size):
         return "without a value (no ground point has this range history)"
     return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
@@ -119,7 +119,7 @@ _FILLER = _Filler()
 
 
 def fill(template: str, quantities: Mapping[str, object]) -> str:
-    """Fill the fields of a template with quantities by name.
+    """Fill each field of a template with the quantity of the same name.
 
     Raises
     ------

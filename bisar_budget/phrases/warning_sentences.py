@@ -99,7 +99,10 @@ def satellite_does_not_fall(
 
 
 def _of_free_fall(acceleration: Sequence[float], has_axes: bool) -> str:
-    """Text with the acceleration of free fall as a line for the mission file, and with the effects included in it."""
+    """Text with the acceleration of free fall as a line for the mission file, and with a remark on this value.
+
+    The remark states the effects that the value includes.
+    """
     components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"

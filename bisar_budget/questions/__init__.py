@@ -1,7 +1,7 @@
-"""The functions of `import bisar_budget as bb`, one module for each question, and the results that they return.
+"""The functions of `import bisar_budget as bb`, with one module for each question, and the results of the functions.
 
-A question has one signature, which the package exports and the command line calls. The other modules of the room are
-the searches behind the answers.
+Each question is a single function, which the package exports and the command line calls. The other modules of this
+package contain the searches that find the answers.
 """
 
 # What other rooms may use.

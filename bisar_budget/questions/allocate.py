@@ -95,10 +95,11 @@ def allocate(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> AllocateResult:
-    """Find specifications for the errors of a mission that together meet every requirement.
+    """Find specifications for errors of a mission; if all of them are met, the mission meets every requirement.
 
-    The split, the rule of combination, the coverage factor, autofocus and the model are those of the mission. Waivers
-    are ignored. The sheet contains the verdict of a full check of the mission with the specified sizes.
+    The split, the rule of combination, the coverage factor, autofocus and the model are taken from the mission.
+    Waivers are ignored. The specification sheet in the result contains the verdict of a full check of the mission
+    with the specified sizes.
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def allocate(
     Raises
     ------
     QuestionError
-        The question cannot be answered for this mission, such as for an unknown key; the message says why.
+        The question cannot be answered for this mission, for example because a key is unknown; the message says why.
     """
     today, influences = influences_of(mission, model, date, outside)
     if reserve is not None and not (isinstance(reserve, Real) and 0 <= reserve < 1):

@@ -91,7 +91,7 @@ class Asked:
                 self._hold_to_a_mission(number)
 
     def again(self, *, cases: Cases | None = None, columns: Sequence[str] | None = None) -> "Asked":
-        """Ask the same with other cases, or with other columns."""
+        """Make the same request with different cases, or with different columns."""
         question = self.question
         return Asked(
             self.mission,
@@ -149,7 +149,10 @@ class Asked:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def _columns(self, missions: Sequence[Mission]) -> Iterator[Column]:
-        """Yield the requested columns; raises `QuestionError` if a field is unknown, or no mission has the row."""
+        """Yield the requested columns.
+
+        Raises `QuestionError` if a column names an unknown field, or a row that no mission has.
+        """
         rows: dict[str, Row] = {}
         for mission in missions:
             rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
@@ -219,7 +222,7 @@ class Asked:
 
     @property
     def inputs(self) -> Mapping[str, str]:
-        """All inputs that determine the values of parts, keyed by the description of each input in messages.
+        """All inputs that determine the results in a part of the sweep, by the description of each input in messages.
 
         Parts with equal inputs can be combined.
         """

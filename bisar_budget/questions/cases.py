@@ -279,9 +279,9 @@ def _range(option: str, number: Number, fields: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Parse the values of an option; a value without a unit has the unit of the last value.
+    """Parse the values of an option; a value without a unit has the unit of the last value in `texts`.
 
-    Returns the varied number, with the unit of the last value, and the values in SI.
+    Returns two results: the varied number, with the unit of the last value, and the values in SI.
     """
     units = [normal_unit(_NUMBER_PREFIX.sub("", text).strip()) for text in texts]
     values = []
@@ -352,7 +352,7 @@ def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
 
 # ---------------------------------------------------------------- cases of a file
 def table_file(tree: JsonObject, path: str) -> Cases:
-    """Read the cases from a CSV file, as in `table`.
+    """Read the cases from a CSV file; the function `table` describes the format.
 
     Raises `TableError` in the same situations as `table`, and if the file is unreadable or too large.
     """
@@ -373,8 +373,8 @@ def table(tree: JsonObject, text: str, file: str) -> Cases:
     """Read cases from CSV: the first line has a header `KEY [unit]` for each column, and each further line is a case.
 
     Empty lines and lines that begin with `#` are ignored. Dimensionless numbers need no unit, and keys whose values
-    are strings have no unit. An unknown string is an error in the table. A number that a key does not accept is
-    detected only when its case is checked.
+    are strings have no unit. An unknown string counts as a fault of the table, but a number that a key does not
+    accept is detected only when its case is checked.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def check(
     mission : Mission
         A result of `load`, `loads` or `Mission.replace`.
     model : str, optional
-        `published`, `full` or `strictest` in place of the mission's model.
+        Model that replaces the model of the mission: `published`, `full` or `strictest`.
     date : str or date, optional
         Day on which waivers are judged; by default the day of SOURCE_DATE_EPOCH, or else today, UTC.
     monte_carlo : int, optional
@@ -303,9 +303,10 @@ def gathered(
 
 # ---------------------------------------------------------------------- specifications
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
-    """Find specifications for the errors of each mission whose file has `allocation.specify`, and add them.
+    """Find specifications for the errors of each mission whose file has `allocation.specify`.
 
-    If no specifications can be found for a mission, it gets a warning that states the reason.
+    The specifications are added to the findings of the mission. If no specifications can be found for a mission, its
+    findings get a warning that states the reason.
     """
     return [
         _with_sheet(findings, model, today) if isinstance(findings, MissionFindings) else findings

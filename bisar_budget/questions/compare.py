@@ -1,4 +1,4 @@
-"""Comparison of catalogue parts (sensors and oscillators) by the verdict on a mission that uses each of them."""
+"""Comparison of catalogue parts (sensors and oscillators): the verdict on a mission with each part in turn."""
 
 import json
 import math
@@ -54,7 +54,7 @@ def compare_parts(mission: Mission, question: Question, progress: Progress) -> C
     ------
     QuestionError
         The catalogue cannot be read, no part has the right kind, the mission takes no figure from any part, or no row
-        decides.
+        decides the verdict.
     """
     (key,) = question.keys
     variation = Variation(mission, question.model)
@@ -167,7 +167,7 @@ class _PartSearch:
         self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Return the value of the key that names the part `name` as the only part of the kind `kind`.
+        """Make a value for the key in which the part `name` is the only part of the kind `kind`.
 
         Parts of other kinds that the mission file names are kept. The value is a string as in a mission file.
         """
@@ -201,7 +201,10 @@ class _PartSearch:
         )
 
     def state(self, candidate: _Candidate, question: Question) -> PartState:
-        """Make the verdict of the mission with a checked candidate, or of the question's row alone if it is set."""
+        """Make the state of a checked candidate, which contains the verdict on the mission with this part.
+
+        If the question is about a row, the verdict is on this row alone.
+        """
         state = PartState(
             id=candidate.id,
             name=candidate.part.name,

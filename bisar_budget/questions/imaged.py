@@ -35,10 +35,10 @@ class ToImage(NamedTuple):
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
     """Choose the mission and the row for which images are formed at a solution.
 
-    The solution is a number with crossings at which the mission begins or ceases to comply, or a comparison of parts.
-    For a number, the mission is taken at the complying side of the crossing with the largest value. For a comparison,
-    it has the complying part with the smallest margin. Returns None if no value complies, if all values comply, or if
-    no row binds.
+    The solution has either the crossings at which the mission begins or ceases to comply as a number varies, or a
+    comparison of parts. In the first case, the number gets its value on the complying side of the crossing with the
+    largest value. In the second case, the mission gets the complying part with the smallest margin. Returns None if
+    no value complies, if all values comply, or if no row binds.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

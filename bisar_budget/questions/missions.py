@@ -60,10 +60,9 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
 
 @dataclass(frozen=True)
 class Spaced:
-    """Range of evenly spaced values for a key of a sweep, made by `linspace` or `geomspace`.
+    """Range of values for a key of a sweep, made by `linspace` or `geomspace`.
 
-    `start` and `stop` are strings with a unit. If `is_log`, successive values have equal ratios instead of equal
-    differences.
+    `start` and `stop` are strings with a unit. Successive values have equal differences, or equal ratios if `is_log`.
     """
 
     start: str
@@ -118,7 +117,7 @@ def cases_of(mission: Mission, values: Mapping[str, object] | str | os.PathLike[
     ------
     QuestionError
         A key is unknown or accepts neither a number nor a name, a key has no values, or paired keys have different
-        numbers of values. A faulty CSV file raises the subclass `TableError`, whose `lines` have one line per fault.
+        numbers of values. A faulty CSV file raises the subclass `TableError`, whose `lines` describe one fault each.
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))

@@ -48,7 +48,7 @@ def _figure(
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
-    """Find the noise or vibration spectrum that a level in decibels shifts, in its form before the shift.
+    """Find the noise or vibration spectrum that a level in decibels shifts; the result is the unshifted spectrum.
 
     `parts` are the components of the key of the level. The result can be tested for equality with another spectrum.
     """

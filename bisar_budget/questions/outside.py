@@ -41,7 +41,7 @@ def day_of(date: str | dt.date | None) -> dt.date:
 
 
 def day_origin(day: str | dt.date | None, giver: str) -> str:
-    """Describe, for reports, where the day on which waivers are judged comes from.
+    """Describe, for reports, the origin of the day on which waivers are judged.
 
     The result is `giver` if `day` is not None, or else the environment variable SOURCE_DATE_EPOCH, or else the day of
     the run.

@@ -178,8 +178,8 @@ def _watched(
 ) -> dict[str, Watched]:
     """Compute the motion of each satellite as seen from the scene, keyed by the name of the platform.
 
-    If the orbit of a platform cannot be used at any time of the span, the function raises the same error as a check
-    at the beginning of the span.
+    If the orbit of a platform is unusable throughout the time span, the function raises the same error as a check at
+    the beginning of the span.
     """
     read = reader_of(folder_of(mission.file))
     seen = {}
@@ -214,7 +214,7 @@ def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) ->
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """Find the times, the track and the mid-time of a pass, without checking its mission.
+    """Find the times, the track and the mid-time of a pass; the mission is not checked.
 
     `stretch` is the time interval of the pass. `squint` [rad] is the squint angle at the mid-time.
     """
@@ -285,7 +285,7 @@ def _checked(
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """Return the change to a mission file that puts the middle of the aperture at the given instant, as a list."""
+    """Return a list with the change to a mission file that puts the middle of the aperture at the given instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 

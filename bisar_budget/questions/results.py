@@ -51,7 +51,7 @@ def frame_of(columns: Mapping[str, object], library: str | None = None) -> DataF
     Parameters
     ----------
     columns : mapping
-        Values of each column by its name; all columns have the same length.
+        Values of each column, by column name; all columns have the same length.
     library : str, optional
         `pandas` or `polars`; by default the first of them that is installed.
 
@@ -167,7 +167,7 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def waived_by(self) -> tuple[str, ...]:
-        """Ids of the waivers that apply to rows or requirements, as in the mission file, such as `receiver.*`."""
+        """Ids of the waivers for rows or requirements, written as in the mission file, such as `receiver.*`."""
         return tuple(waiver.id for waiver in self.findings.waived_by)
 
     @property

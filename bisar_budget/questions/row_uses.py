@@ -144,7 +144,7 @@ class SpecifiedMission:
         self.largest = np.array([error.largest for error in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
-        """Yield the changes of the mission file that replace balanced shares by equal shares.
+        """Yield the changes to the mission file that replace balanced shares by equal shares.
 
         Balanced shares depend on the sizes of the declared errors, which are still unknown.
         """

@@ -70,11 +70,11 @@ _EARTH_RADIUS_M = 6.371e6  # mean radius
 class Stated(NamedTuple):
     """A number of the mission file that the sensitivity analysis varies; `text` is the number as written in the file.
 
-    A central difference extends from `step` below the value to `step` above it. `per` is the increase for which
-    effects are given, in SI, and `per_text` is the same increase as text. `part` is this increase as a dimensionless
-    ratio, with the same references as `Slope.measure`. `others` are further numbers that change with this number. For
-    a share of a budget they are all remaining shares, because the shares sum to 1. For a covariance the value is a
-    factor by which all sigmas are multiplied.
+    A central difference extends from `step` below the value to `step` above it. `per` is the increase, in SI, for
+    which effects are given, and `per_text` is the same increase as text. `part` is this increase as a dimensionless
+    ratio, with the same references as `Slope.measure`. `others` are further numbers that change with this number.
+    For a share of a budget, these are all remaining shares, because the shares sum to 1. For a covariance, the
+    number is a factor by which all sigmas are multiplied.
     """
 
     number: Number
@@ -106,9 +106,9 @@ def sensitivity(
     All numbers that the file states or takes from a part are considered. Each is changed alone, in both directions,
     and the mission is checked again in full, so that no effect is left out. Effects are given for a change by 1 % of
     the number, by a degree for directions, by a decibel for levels, and by 1 % of the smaller slant range for
-    latitudes and longitudes. They are changes of utilization; 0.01 is 1 % of a limit. The number that uses up the
-    margin with the smallest change comes first. For this comparison, changes are expressed as dimensionless ratios;
-    see `Slope.measure`. The arguments are those of `solve`.
+    latitudes and longitudes. An effect is a change of utilization; 0.01 is 1 % of a limit. The number that uses up
+    the margin with the smallest change comes first. For this comparison, changes are expressed as dimensionless
+    ratios; see `Slope.measure`. The arguments have the same meaning as for `solve`.
 
     Raises
     ------
@@ -316,10 +316,10 @@ Leaf = tuple[str, Reader[object], Content, Mapping[str, object] | None]
 
 
 def _leaves(reader: Reader[object], value: object, path: tuple[str, ...], above: JsonObject | None) -> Iterator[Leaf]:
-    """Yield the key, the reader and the value of every leaf of the tree of a mission file, and its shares.
+    """Yield the key, the reader, the value and the shares of every leaf in the tree of a mission file.
 
-    If the leaf is the share of a budget, its shares are all shares in the same section, its own included. For any
-    other leaf they are None.
+    If the leaf is the share of a budget, its shares are all shares in the same section, including the leaf itself.
+    For any other leaf, the shares are None.
     """
     reader = form_of(reader, value)
     children: Sequence[tuple[str, object]] = ()
@@ -384,9 +384,9 @@ def _no_number(key: str, reader: Reader[object]) -> str:
 
 # ---------------------------------------------------------------- shares that follow the declared errors
 def relaxed_errors(mission: Mission, judged: JudgedMission, today: date) -> Iterator[Relaxed]:
-    """Yield the effect of doubling each declared error.
+    """Yield, for each declared error, the effect that doubling this error has on the other errors.
 
-    `judged` is the judged mission with the errors as declared.
+    `judged` is the judged mission with the errors as declared. Errors of size 0 are left out.
     """
     for key in _declared_errors(mission):
         try:

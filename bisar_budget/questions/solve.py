@@ -226,7 +226,7 @@ class _Search:
         def judged() -> Iterator[JudgedMission]:
             """Judge the mission with the number as in the file, and with the number at the upper end of the range.
 
-            The second case is needed because the error may not be declared at the value in the file.
+            The second case is needed because an error may count as undeclared with the value in the file.
             """
             yield judged_mission(Analysis(self.base), question.today)
             with suppress(MissionError):
@@ -239,7 +239,7 @@ class _Search:
         self.levels = SOLVE_SETTINGS.read_ahead_steps if self.table.to_read else SOLVE_SETTINGS.ahead_steps
 
     def solution(self, progress: Progress) -> Solution:
-        """Search the range; raises `QuestionError` if no value of it makes a mission."""
+        """Search the range, and return the solution; raises `QuestionError` if no value gives a valid mission."""
         scanned, file_state = self.scanned(progress)
         borders = [(low, high) for low, high in pairwise(scanned) if low.complies != high.complies]
         crossings = self.crossings(borders)
@@ -386,8 +386,8 @@ def _bracketed(
 def _ahead(points: Callable[[float, float], tuple[float, ...]], low: float, high: float, levels: int) -> set[float]:
     """Find all values that the next `levels` steps of a search may need.
 
-    `points` is a function that returns the values to check in an interval. The next interval of the search is either
-    the part below the last of these values or the part above the first.
+    `points` is a function that returns the values to check in an interval. The search continues either
+    below the last of these values or above the first, within the same interval.
     """
     values = points(low, high)
     if not levels or not low < values[0] < high:

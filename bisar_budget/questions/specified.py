@@ -159,8 +159,8 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
 def usual_keys(mission: Mission) -> Iterator[str]:
     """Yield the keys that are specified by default: position, velocity, acceleration and clock errors.
 
-    Errors that a part or a covariance determines are left out. An aided navigation determines velocity and
-    acceleration, and is specified by its level.
+    Errors that a part or a covariance determines are left out. An aided navigation determines the errors of
+    velocity and acceleration; its level is specified instead.
     """
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
@@ -211,7 +211,7 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
 
 
 def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
-    """Find two keys whose values multiply each other in the mission, so that requirements limit only their product.
+    """Find two keys whose values have an effect only as a product, so that requirements limit only this product.
 
     The first key is a level [dB], and the second key is an error that the level scales. Returns None if there are no
     such keys.
@@ -307,8 +307,8 @@ def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
     """Find the phase noise spectrum of a platform's oscillator, and the frequency to which it refers [Hz].
 
-    It is the frequency that the file states for the oscillator, or else the centre frequency of the radar. The
-    spectrum applies at a level of 0 dB.
+    This frequency is stated for the oscillator in the file; if it is not, the centre frequency of the radar is used.
+    The spectrum applies at a level of 0 dB.
     """
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency

@@ -62,7 +62,7 @@ def sweep(
     mission : Mission
         As in `check`.
     values : mapping, path or cases
-        Values by the path of a key, such as `collection.aperture_time`. Values are a range such as
+        The values of each key, by the path of the key, such as `collection.aperture_time`. They are a range such as
         `linspace("1 s", "5 s", 101)`, an array of numbers in SI, a quantity with an array, a list of strings with
         units, or a list of names, such as parts of the catalogue. Alternatively `values` is the path of a CSV file,
         whose header has `KEY [unit]` for each column.

@@ -77,8 +77,8 @@ def _verdict(
 ) -> dict[str, ArrayLike]:
     """Make the columns of the verdict: the status of the mission or of one row, and the binding row, in each case.
 
-    The binding row is the judged row with the highest utilization; among rows that differ only by rounding it is the
-    first one. A row that is not evaluated and has no utilization cannot be the binding row. If the mission does not
+    The binding row is the judged row with the highest utilization; among rows that differ only by rounding, it is the
+    first row. A row that is not evaluated and has no utilization cannot be the binding row. If the mission does not
     comply, the binding row is a row that breaks a limit; it is a waived row only if no other row breaks a limit.
     If the verdict of a case is `not_evaluated`, its utilization is NaN: the missing evaluation decides the verdict,
     not the utilization of any row.
@@ -231,8 +231,8 @@ class Question(NamedTuple):
     """Everything that a process needs to check cases of a mission.
 
     `keys` are the varied keys with numerical values, and `choices` are the varied keys with string values. If `row`
-    is set, this row is judged instead of the whole mission. `target` is that of `solve`, or empty if every status
-    complies. `named` holds the files that the mission names, for a process that cannot read them itself.
+    is set, this row is judged instead of the whole mission. `target` is the argument of `solve`, or empty if every
+    status complies. `named` holds the files that the mission names, for a process that cannot read them itself.
     """
 
     data: bytes
@@ -398,7 +398,10 @@ class Table:
         read_indices: list[int] = []
 
         def read() -> Iterator[Mission]:
-            """Read the missions that arrays cannot represent, and append their indices to `read_indices`."""
+            """Yield the missions of all cases that arrays cannot represent, read one by one.
+
+            The indices of cases with a valid mission are appended to `read_indices`.
+            """
             for index in np.delete(np.arange(cases), indices).tolist():
                 mission = self._read(columns, index)
                 if mission is not None:

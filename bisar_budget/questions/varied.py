@@ -226,7 +226,7 @@ _ACCEPTED_KEYS = (
 
 
 def scaled(mission: Mission, key: str, factor: PerCase) -> Mission:
-    """Multiply every error of a mission below a key by a factor, and return the changed mission.
+    """Multiply all errors below a key of a mission by a factor, and return the changed mission.
 
     Amplitudes and sigmas are multiplied, including figures that come from parts of the catalogue. Frequencies,
     correlation times and correlations are not changed. The factor may be an array (cases,).

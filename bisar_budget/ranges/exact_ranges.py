@@ -138,7 +138,7 @@ def aperture_nodes(aperture_time_s: float) -> Floats:
 
 
 class Effect(NamedTuple):
-    """Effect of one unit of an error by the published model, with the sign of the range error.
+    """Effect of one unit of an error according to the published model, with the sign of the range error.
 
     Fields are numbers for a single case, or arrays for many cases. `constant` [m/unit] and `linear` [(m/s)/unit] are
     the constant and the linear term of the range error at the aperture midpoint. `qpe` and `cubic` [rad/unit] are the
@@ -152,7 +152,7 @@ class Effect(NamedTuple):
 
 
 class FullEffect(NamedTuple):
-    """Effect of one unit of a small error by the full model.
+    """Effect of one unit of a small error according to the full model.
 
     Fields are numbers for a single case, or arrays for many cases. `east` and `north` [m/unit] are the displacement.
     `qpe` and `cubic` [rad/unit] are the quadratic and the cubic phase at the aperture edge. They have the sign of the
@@ -503,9 +503,9 @@ class ExactRanges:
 
     @cached_property
     def near_fold(self) -> Floats:
-        """Threshold for the determinant of H, below which a point counts as near a fold, (n,).
+        """Threshold for the determinant of the matrix H, (n,); a point with a smaller determinant is near a fold.
 
-        The module docstring defines the matrix H. H.
+        The module docstring defines the matrix H.
         """
         return np.asarray(POINT_SETTINGS.near_fold_fraction**2 * self.matrix.determinant)
 
@@ -569,7 +569,7 @@ class ExactRanges:
     # ------------------------------------------------------------------ small errors
     @cached_property
     def powers(self) -> tuple[Floats, ...]:
-        """Position error at the nodes per unit of a position, velocity and acceleration error, (nodes, n) each."""
+        """Position errors at the nodes due to unit errors of position, velocity and acceleration, (nodes, n) each."""
         return tuple(kind.course(self.times) for kind in STATE_KINDS)
 
     def clock_course(self, terms: Sequence[PerCase]) -> Floats:
@@ -625,10 +625,11 @@ class ExactRanges:
 
     @cached_property
     def order_weights(self) -> Floats:
-        """Legendre parts of the range error at the displaced point, per metre of range error at a node. [m/m]
+        """Legendre parts of the range error at the displaced point, per metre of error at a node. [m/m]
 
-        The array has the shape (4, nodes, n), for the orders 0 to 3. Its products with the range error, summed over
-        the nodes, are the parts, given by their values at the aperture edge.
+        The error at a node is the range error at the point before its displacement. The array has the shape
+        (4, nodes, n), for the orders 0 to 3. To obtain the parts, as values at the aperture edge, multiply the array
+        by the errors at the nodes, and sum over the nodes.
         """
         (by_east, by_north), (east, north) = self.gradient, self.place_weights
         return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
@@ -647,8 +648,7 @@ class ExactRanges:
 
         The array has the shape (4, nodes, n), for the orders 0 to 3. The square of the hidden phase is the sum of the
         squares of its contributions. Range errors beyond order 3 are not included. Their weight in the hidden phase
-        is only b² (the attribute `band`), which is small. The exception is a line of sight that turns by more than
-        `MAX_TURN_RAD`.
+        is only b² (the attribute `band`), which is small, unless a line of sight turns by more than `MAX_TURN_RAD`.
         """
         of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
         of_orders[3] += self.is_turned / (7 * 2.5**2)
@@ -693,8 +693,8 @@ class ExactRanges:
     def left_of_small(self, range_error: Floats, moved: tuple[PerCase, PerCase]) -> Floats:
         """Range error that remains at the point to which small errors displace the response. [m]
 
-        `range_error` [m] is the range error at the nodes, (..., nodes, cases). `moved` [m] is the displacement east
-        and north, (..., cases).
+        `range_error` [m] is the range error at the nodes before the displacement, (..., nodes, cases). `moved` [m] is
+        the displacement east and north, (..., cases).
         """
         (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
@@ -732,7 +732,7 @@ class ExactRanges:
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, point: tuple[PerCase, PerCase]) -> Floats:
-        """Range error at the nodes for errors of given sizes and for given ground points, (nodes, lanes). [m]
+        """Range error that errors of given sizes leave at given ground points, at each node, (nodes, lanes). [m]
 
         Each lane has one error and one ground point. `size` has the sizes of the errors, and `point` [m] the
         coordinates of the ground points, east and north.
@@ -745,7 +745,10 @@ class ExactRanges:
         return np.asarray(clock - growth[0] - growth[1])
 
     def _heard(self, shifts: Iterable[Any], case: Indices) -> Floats:
-        """Clock error c·t̃ due to shifts of the platforms if the direct path is the clock, (nodes, lanes). [m]"""
+        """Clock error c·t̃ due to shifts of the platforms, (nodes, lanes). [m]
+
+        It arises if the receiver uses the direct path from the transmitter as its clock.
+        """
         a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
         x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
@@ -953,9 +956,10 @@ class _PointSearch:
         return _GroundView(seen, looks, distances, self.exact.sampling.centred, self.weights)
 
     def _last_step(self, view: "_GroundView") -> Floats:
-        """Threshold for the step of each lane, below which the search of the lane ends. [m]
+        """Threshold at which the search of each lane ends. [m]
 
-        The threshold is compared with the square of the step, divided by the smallest range of a platform.
+        The search of a lane ends when the square of its step, divided by the smallest range of a platform, is below
+        this threshold.
         """
         is_near_fold = view.determinant < self.near_fold
         smaller, usual = (
@@ -1031,7 +1035,7 @@ class _GroundView:
 
     @property
     def variance(self) -> Floats:
-        """Phase variance V of the module docstring at the ground point of each lane, (lanes,). [m²]"""
+        """Phase variance V, which the module docstring defines, at the ground point of each lane, (lanes,). [m²]"""
         return np.asarray(np.einsum("nc,nc->c", self._weighted[0], self._parts[0]))
 
     def products(self, values: Floats) -> Floats:
@@ -1069,11 +1073,11 @@ def _solved(bends: Sequence[Floats], slope: Floats) -> Floats:
 def _unresolved(
     orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Booleans
 ) -> tuple[Floats, Floats]:
-    """Hidden phase, and rms of the phase beyond the cubic phase, from a range error at the displaced point. [rad]
+    """Hidden phase [rad], and RMS of the phase beyond order 3 [rad], due to the range error at the displaced point.
 
-    `orders` [m] are the Legendre parts of orders 0 to 3 of the range error, given by their values at the aperture
-    edge. `squares` [m²] are the mean square of the range error and the mean square of its part beyond order 3. The
-    other parameters are attributes of `ExactRanges`.
+    The module docstring defines the hidden phase. `orders` [m] are the values at the aperture edge of the Legendre
+    parts of orders 0 to 3 of the range error. `squares` [m²] are the mean square of the range error, and the mean
+    square of its part beyond order 3. `k`, `band` and `is_turned` are attributes of `ExactRanges`.
     """
     _, slope, _, cubic = orders
     square, beyond_cubic = squares
@@ -1126,8 +1130,9 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Shifts, case: Indices) -
     ImagePoints
         Image points and remaining phases. If a search does not converge, the error is increased to its full size in
         steps. The values are NaN if no ground point has the recorded range history, or if the image point does not
-        reach such a ground point as the error grows. As in `point_paths`, it is assumed that no point has the history
-        if the hidden phase exceeds half a cycle and the determinant of the matrix H of the module docstring is small.
+        reach such a ground point as the error grows. As in `point_paths`, it is assumed that no ground point has the
+        recorded range history if the hidden phase exceeds half a cycle and the determinant of H is small. The module
+        docstring defines the hidden phase and the matrix H.
     """
     points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
     for steps in POINT_SETTINGS.course_steps:

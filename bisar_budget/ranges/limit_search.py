@@ -1,9 +1,9 @@
 """Search for the smallest size at which an error reaches a limit, along the path of the image point.
 
 A search works with the squared ratio of a phase or displacement to its limit. The square is used because it is a
-smooth function of the size, and the magnitude is not. After each step the search uses all known points of the path.
-It ends if an interpolated point is close enough to the limit, and if a local maximum above the limit is not possible
-at any smaller size. All searches take their steps at the same time.
+smooth function of the size, whereas the magnitude is not. After each step the search uses all known points of the
+path. It ends as soon as an interpolated point is close enough to the limit and a local maximum above the limit is
+impossible at all smaller sizes. All searches take their steps at the same time.
 """
 
 import math
@@ -154,7 +154,7 @@ def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Float
     searches : LimitSearches
         Limits to search for, each with its path and with the sizes at which the search begins and ends.
     smallest : (requirements, groups)
-        Smallest sizes known so far. Larger sizes are replaced by smaller sizes that the searches find. [unit]
+        Smallest sizes known so far [unit]. If a search finds a smaller size, this size is stored instead.
     """
     tries = np.zeros(searches.lane.shape, dtype=int)
     for _ in range(SEARCH_SETTINGS.max_rounds):

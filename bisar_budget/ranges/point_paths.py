@@ -41,8 +41,8 @@ class PathSettings:
     stray_m : float
         Distance that is allowed in addition to `stray_fraction`, because steps may have almost no length. [m]
     fade_fraction : float
-        Largest distance from a peak that is lost at a fold to the wider peak into which it fades, as a fraction of
-        the displacement.
+        Largest distance between a peak that is lost at a fold and the wider peak into which it fades, as a fraction
+        of the displacement.
     straight_fraction : float
         Largest deviation from a straight line at which a path counts as almost straight, as a fraction of the
         displacement.
@@ -80,7 +80,10 @@ PATH_SETTINGS = PathSettings()
 
 
 def tries_several_sizes(lane_count: int, is_alike: bool) -> bool:
-    """Whether a step tries several sizes per lane: True if `is_alike` or if there are only a few lanes."""
+    """Whether a step tries several sizes per lane.
+
+    This is the case if `is_alike` (see `PointPaths`) is True, or if there are only a few lanes.
+    """
     return is_alike or lane_count < PATH_SETTINGS.few_lanes_count
 
 
@@ -125,8 +128,8 @@ class PointPaths:
     def known(self, lane: Indices, size: Floats) -> Floats:
         """Known point of each path at a given error size, (rows, lanes).
 
-        `ROWS` lists the rows. `follow_to` must have reached the sizes before. The values are NaN beyond the end of a
-        path.
+        `ROWS` lists the rows. `follow_to` must be called with the sizes before this function. The values are NaN
+        beyond the end of a path.
         """
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
@@ -266,7 +269,7 @@ class PointPaths:
 
     # ---------------------------------------------------------------- predictions
     def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
-        """Increase of an error's size from its last known point to the next fold; infinite without a fold. [unit]
+        """Increase of an error's size from its last known point to the next fold [unit]; infinite if no fold follows.
 
         At a fold the range and Doppler gradients are parallel, and the determinant of the matrix H (see
         `exact_ranges`) is zero. A parabola through the determinants (squared areas) at the last three known points is
@@ -286,7 +289,8 @@ class PointPaths:
     def _predicted(self, index: Indices, lane: Indices, last: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Predict the image points at given sizes from the known points, east and north. [m]
 
-        An almost straight path is predicted by a parabola from its start, and a bent path from its last known point.
+        If the path is almost straight, a parabola that begins at its start is used. If the path is bent, the
+        prediction begins at its last known point.
         """
         u, v = self._slope_at_start[:, lane]
         bend = (last[EAST] - u * last[SIZE], last[NORTH] - v * last[SIZE])

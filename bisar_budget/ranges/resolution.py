@@ -2,8 +2,8 @@
 
 A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c. Here g is the sum of
 the horizontal components of both lines of sight. The vectors 2πf·g/c are the wave-number support. The response at the
-distance of a step from the peak is the mean of e^(i·phase) over the support. The cross-range width is the width along
-the line of equal range at mid-aperture. The range width is the width along the conjugate direction, in which the
+displacement x from the peak is the mean of e^(i·phase) over the support. The cross-range width is the width along the
+line of equal range at mid-aperture. The range width is the width along the conjugate direction, in which the
 phase of a step is not correlated with the phase of a step along this line. The range width is given as a distance
 perpendicular to the line. For a short aperture the conjugate direction is the line of equal Doppler, and the support
 is a parallelogram. The first nulls then lie at c/(B|s|) and λ/(T|ṡ⊥|). Here s is the value of g at mid-aperture, and
@@ -151,7 +151,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
 def _settled(step: Floats, reach: float, value: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
     """Find the root of a function by Newton's method, within `reach` of `step`.
 
-    `value` returns the function and its slope.
+    `value` returns the value of the function and its slope.
     """
     low, high = step - reach, step + reach
     for _ in range(_NEWTON_ROUNDS):

@@ -67,9 +67,9 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Swatch:
-    """Colour key for the share of a platform or the clock in a `Stack`.
+    """Colour key for the share of a platform or of the clock in a `Stack`.
 
-    Markdown has no stack. Each fraction is therefore shown as a bar instead.
+    Markdown output contains neither colours nor the `Stack`. It shows a bar for `fraction` in place of the key.
     """
 
     owner: str
@@ -133,7 +133,8 @@ class Head:
     """The head of a table column. Its style is `number` (right-aligned), `id` or empty for text.
 
     `unit` is the unit of the numbers below it. If `medium` is `TERMINAL` or `PAGE`, only that medium has the column.
-    `width` is the smallest width of the column on a terminal. A text that `is_sentence` may be below its row there.
+    `width` is the smallest width of the column on a terminal. If `is_sentence`, a text that is
+    too long for the column is written below its row on a terminal.
     """
 
     text: Text
@@ -206,7 +207,8 @@ class Only:
 class Lead:
     """A line for a terminal that begins with a status.
 
-    A long line is broken at blanks; with `breaks`, only at blanks after these characters, or nowhere if it is empty.
+    `breaks` states the positions at which a long line may be broken: all blanks (the default), blanks
+    after the characters in `breaks`, or no position if `breaks` is empty.
     """
 
     status: str
@@ -216,7 +218,7 @@ class Lead:
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """Settings from outside the file, for a terminal: on one line if they fit."""
+    """Settings from outside the file, written for a terminal, on one line if they fit."""
 
     texts: Sequence[str]
 
@@ -232,8 +234,8 @@ class Close:
 class TextTable:
     """A table of text. The first cell of each row is the name of the row.
 
-    `label` is the accessible name of the scrolling region around the table. A narrow table has no label. On a
-    terminal, `below` has texts below each row.
+    `label` is the accessible name of the scrolling region around the table. A narrow table has no label. `below` has
+    the texts that a terminal shows below each row.
     """
 
     label: str

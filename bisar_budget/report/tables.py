@@ -191,8 +191,8 @@ def write_netcdf(described: Described, blocks: Iterable[Part], path: str) -> Non
     """Write a NetCDF file that follows the CF conventions.
 
     If the cases form a grid, each varied key is a dimension; otherwise the only dimension is `case`. Strings are
-    stored as CF flags, which are numbers with a list of their meanings. Reasons are stored as strings, because every
-    case may have a different reason. Missing numbers are NaN.
+    stored as CF flags, which are numbers with a list of their meanings. The reason why a case has no valid mission is
+    stored as a string instead, because every case may have a different reason. Missing numbers are NaN.
     """
     from netCDF4 import Dataset
 

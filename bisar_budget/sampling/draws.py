@@ -1,7 +1,7 @@
 """Random draws of independent errors, and counts of the draws that meet each requirement.
 
 For small errors the full model is linear: the effect of a draw is the sum of the effects of standardized random
-variables, each multiplied by the drawn value. A sample of draws is also computed from exact ranges. If the two
+variables, each multiplied by its drawn value. A sample of draws is also computed from exact ranges. If the two
 results differ by more than 1 % of a limit, all draws are computed from exact ranges.
 
 Draws are divided into chunks of a fixed size. The random numbers of a chunk depend only on the seed, on the name of
@@ -65,8 +65,8 @@ class HeldSum(NamedTuple):
     `owners` are the owners of the summed errors, such as `receiver` or `clock`. `columns` are the indices of the
     summed effects in `Variable.effects`. `limit` is in `unit`. The limit of a quadratic phase error includes the
     `gain` of autofocus. Autofocus does not correct the hidden phase, which is the part of the phase that the
-    bandwidth and the turn of the line of sight do not resolve. The hidden phase is therefore multiplied by `gain`
-    before the comparison.
+    bandwidth and the turn of the line of sight do not resolve. Before it is compared with this limit, the hidden
+    phase is therefore multiplied by `gain`.
     """
 
     id: str
@@ -102,9 +102,9 @@ class Drawing(NamedTuple):
     chunk: int
 
     def pieces(self) -> Iterator[DrawsPiece]:
-        """Divide the draws into pieces. The division is always the same for the same data.
+        """Yield the pieces into which the draws are divided. The division is always the same for the same data.
 
-        No piece is yielded if there is no requirement to compare with.
+        No piece is yielded if there is no requirement with which draws can be compared.
         """
         size = min(EXACT_PIECE_DRAWS, self.chunk) if self.is_exact else self.chunk
         for start in range(0, self.draws if self.judged else 0, size):
@@ -114,8 +114,8 @@ class Drawing(NamedTuple):
 class Tally(NamedTuple):
     """Counts of draws and sums of squared errors in one piece of the draws.
 
-    For each requirement, `holds` is the number of draws that meet it, `imaged` is the number of draws that have an
-    image, and `squares` is the sum of the squared errors of the draws with an image. `all_hold` is the number of
+    For each requirement, `holds` is the number of draws that meet it, `imaged` is the number of draws with which an
+    image can be formed, and `squares` is the sum of the squared errors of these draws. `all_hold` is the number of
     draws that meet all requirements.
     """
 
@@ -201,11 +201,11 @@ class Sums:
     effect over the whole mission. `square` can then be called. If `keeps_motion` is true, the errors themselves are
     summed for each owner, as input for exact ranges. `exact_square` can then be called.
 
-    In the second case there are the following arrays for each owner. `motion` (2, 3, 3, draws) holds position,
-    velocity and acceleration errors of both platforms, `tags` (2, draws) time tag errors of both platforms, and
-    `clock` (4, draws) clock coefficients. `registered` holds errors of registered kinds (see `error_kinds`), each
-    with its sizes (draws,). `alone` (4, draws) is for errors of which only the effects are known: quadratic and cubic
-    phase, and displacement east and north.
+    For exact ranges there are the following arrays for each owner. `motion` (2, 3, 3, draws) holds position, velocity
+    and acceleration errors of both platforms, `tags` (2, draws) time tag errors of both platforms, and `clock` (4,
+    draws) clock coefficients. `registered` holds errors of registered kinds (see `error_kinds`), each with its sizes
+    (draws,). `alone` (4, draws) is for errors of which only the effects are known: quadratic and cubic phase, and
+    displacement east and north.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -345,7 +345,7 @@ def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats)
 class Drawer:
     """Object that computes pieces of the draws, and keeps the state of the random streams between two pieces.
 
-    The random streams are continued if the next piece is in the same chunk, and after the previous piece.
+    The random streams are continued if the next piece follows after the previous piece in the same chunk.
     """
 
     def __init__(self, drawing: Drawing) -> None:
@@ -433,7 +433,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """Choose the function that fills an array with normal draws: compiled by Numba if possible, else from NumPy.
+    """Choose the function that fills an array with normal draws: compiled by Numba if possible, or from NumPy.
 
     Numba is not used if it is not installed, if there is little memory, or if it cannot store compiled code.
     """

@@ -183,7 +183,8 @@ def _requirements(
     """Yield the requirements with which draws are compared.
 
     These are the requirements of `check` to which declared errors contribute. `is_placed` states whether the
-    displacements caused by all errors are known. If they are not, the requirement on location error is left out.
+    displacements caused by all errors are known. If any displacement is unknown, the requirement on location error is
+    left out.
     """
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
@@ -207,7 +208,10 @@ def _requirements(
 
 
 class _Predictions:
-    """Results that need no draws: combined errors as in `check`, variances, and probabilities of a normal sum."""
+    """Results that are computed without draws.
+
+    They are the combined errors as in `check`, variances, and probabilities for a normal distribution.
+    """
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
         self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
@@ -229,9 +233,10 @@ class _Predictions:
         return float(size[0]) if math.isfinite(size[0]) else None
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
-        """Variance that each error or covariance contributes to the sum that a requirement limits, by id.
+        """Variances that errors and covariances contribute to the sum that a requirement limits.
 
-        The unit is the square of the unit of the requirement.
+        The keys are the ids of the errors and covariances. The unit of the values is the square of the unit of the
+        requirement.
         """
         by_error: dict[str, float] = {}
         for variable in self.variables:
@@ -248,7 +253,10 @@ class _Predictions:
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
-        """Probability that a normally distributed sum with the same variances as the errors is within the limit."""
+        """Probability that the sum of the errors is within the limit, for normally distributed errors.
+
+        Each error has the same variance as with its declared distribution.
+        """
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
         xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
@@ -279,10 +287,10 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
-    """Confidence interval of a probability by the Wilson score.
+    """Confidence interval of a probability, computed as a Wilson score interval.
 
     `quantile` is a quantile of the standard normal distribution. The formula is also valid for a small number of
-    draws, even if all of them succeed or all fail.
+    draws, even if all draws succeed or all draws fail.
     """
     p, z = successes / draws, quantile
     middle = p + z**2 / (2 * draws)
@@ -318,9 +326,11 @@ def _requirement(
 
 
 def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
-    """Yield warnings if root-sum-square or a normal distribution describes the errors of a requirement poorly.
+    """Yield warnings if root-sum-square or a normal distribution is a poor description of the summed errors.
 
-    The errors of a requirement are the errors whose sum the requirement limits.
+    `requirement` limits the sum of these errors. There is a warning if an error that is not normally distributed
+    dominates the variance, or if the probability for a normal distribution differs clearly from the result of the
+    draws.
     """
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):

@@ -130,8 +130,8 @@ def phase_gradient_autofocus(image: Complexes) -> Focused:
 
     Clutter causes an error of the estimated phase of about √(window / (2 · targets · ratio)) rad rms. Here the window
     is ±12 cells, and the ratio is the target power divided by the clutter power. In an image of at most a dozen
-    targets, targets that lie in each other's windows add 0.1 to 0.3 rad. The phase is not corrected where the
-    amplitude taper falls below a tenth of its maximum, as a Taylor taper of -45 dB does at its ends.
+    targets, targets that lie in each other's windows add 0.1 to 0.3 rad to this error. The phase is not corrected
+    where the amplitude taper falls below a tenth of its maximum, as a Taylor taper of -45 dB does at its ends.
     """
     image = _checked(image)
     rows, level = _range_lines(image)
@@ -289,11 +289,11 @@ def _range_lines(image: Complexes) -> tuple[Indices, Floats]:
 
 
 def _common_phase(aperture: Complexes, line_samples: int, threshold: float) -> Floats:
-    """Estimate the phase error that all range lines have in common over the band, by phase gradients, (count,). [rad]
+    """Estimate from phase gradients the phase error that all range lines have in common, (count,). [rad]
 
-    `aperture` (lines, count) is the spectrum of the range lines within the band, scaled so that the clutter power is
-    1. Range lines of `line_samples` samples are computed from it. Pixels with a power above `threshold` count as
-    targets.
+    `aperture` (lines, count) is the spectrum of the range lines within the band of the aperture, scaled so that the
+    clutter power is 1. Range lines of `line_samples` samples are computed from it. Pixels with a power above
+    `threshold` count as targets.
     """
     count = aperture.shape[1]
     per_cell = line_samples / count

@@ -194,9 +194,9 @@ class RangeLines:
         """Cell sizes that set the pixel spacing, across and along the lines of equal range. [m]
 
         The sizes are the results of `cells`, except that the size across the lines may be smaller. If the aperture is
-        long and a platform is near, the wavefronts are so strongly curved that a point is out of focus even less than
-        a cell away along its column. The spectrum along the column is then wider than the bandwidth, so that smaller
-        pixels are needed.
+        long and a platform is near, the wavefronts are so strongly curved that a response is defocused along its
+        column even within one cell of its peak. The spectrum along the column is then wider than the bandwidth, so
+        that smaller pixels are needed.
         """
         across, along = self.cells(centre, radar)
         if self.turns_back:
@@ -514,8 +514,9 @@ class PointCollection:
     def _require_room(self, cells: int, range_cells: float) -> None:
         """Raise a `ValueError` if a patch aliases, is too large or needs too much memory.
 
-        The patch is `cells` resolution cells wide along y′ and `range_cells` along x′. The memory is checked for the
-        number of pulses that the patch needs, because additional pulses would not change the image.
+        The patch is `cells` resolution cells wide along y′ and `range_cells` along x′. The memory is computed for the
+        number of pulses that the patch needs, even if the mission has more: additional pulses would not change the
+        image.
         """
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")
@@ -542,8 +543,8 @@ class PointCollection:
 def pulses_for(cells: int) -> int:
     """Number of pulses for a patch that is `cells` resolution cells wide in cross-range.
 
-    A patch of up to 128 cells gets four pulses per cell. A large patch needs only two pulses per cell, because its
-    aliases are far from the response.
+    A patch of up to 128 cells gets four pulses per cell. A patch of 256 or more cells needs only two pulses per cell,
+    because its aliases are far from the response.
     """
     return max(_PULSES_PER_CELL * min(cells, _LARGE_PATCH_CELLS), _PULSES_PER_CELL // 2 * cells)
 

@@ -67,7 +67,8 @@ class Lattice(NamedTuple):
     def disc(self) -> tuple[Floats, float]:
         """Centre (3,) and radius of a disc that contains all pixels. [m]
 
-        The disc also contains the pixels by which each line is extended to a whole number of segments.
+        Each line is extended to a whole number of segments; the disc also contains the pixels that are added for
+        this.
         """
         i, j = (self.shape[0] - 1) / 2, (-(-self.shape[1] // _SEGMENT_LENGTH) * _SEGMENT_LENGTH - 1) / 2
         centre = self.origin + i * self.across + j * self.along
@@ -120,9 +121,9 @@ def backproject(history: PhaseHistory, points: Floats) -> Complexes | None:
     Returns
     -------
     (...) ndarray or None
-        Complex image. The result is None if the range profiles would have to be refined over a long interval for
-        only a few pixels, and if this refinement would take longer than computing each pixel separately, or more
-        memory than a block of profiles.
+        Complex image. The result is None if refined range profiles are not worthwhile: a few pixels need more than a
+        full period of each profile, and the refinement would either take longer than computing each pixel separately
+        or need more memory than a block of profiles.
     """
     shape = points.shape[:-1]
     image = np.zeros(shape, dtype=complex)
@@ -239,7 +240,8 @@ def _kernel(offset: Floats) -> Floats:
     `offset` [samples] is the distance from the centre. The kernel is meant for offsets within ±_KERNEL_SAMPLES/2.
 
     Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
-    'exponential of semicircle' kernel", 2019. The shape parameter is the value that they give for this oversampling.
+    'exponential of semicircle' kernel", 2019. The shape parameter is the value that the authors give for this
+    oversampling.
     """
     shape = 0.976 * math.pi * _KERNEL_SAMPLES * (1 - 1 / (2 * _FFT_OVERSAMPLING_FACTOR))
     return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _KERNEL_SAMPLES) ** 2, 0.0, None)) - 1))
@@ -372,8 +374,8 @@ def _split(ranges, per_metre, first, cycles, whole_samples, fraction, turn, orde
     `ranges` holds the coefficients from `_expand`. Row 0 of `whole_samples` and `fraction` is the sample at the
     middle of a segment; row 1 is the number of samples per pixel. The range in carrier cycles is a polynomial in the
     distance from the middle of a segment in pixels: `turn` holds its coefficients 0 to 2, without whole cycles, as
-    integers in units of 2⁻³² cycles, and `order` holds its coefficients 2 to 4. All results are computed in double
-    precision.
+    integers in units of 2⁻³² cycles, and `order` holds its coefficients 2 to 4 in cycles. Coefficient 2 is in both
+    arrays, because `order` is also used to compute sample positions. All results are computed in double precision.
     """
     for i in range(ranges.shape[1]):
         cell, step = ranges[0, i] * per_metre - first, ranges[1, i] * per_metre

@@ -212,7 +212,7 @@ def polar_format(
 def _grid(low: float, high: float, step: float) -> Floats:
     """Multiples of a frequency step between the bounds `low` and `high` [Hz]. The result may be empty.
 
-    An FFT of samples at these frequencies has no carrier.
+    An FFT of samples at such frequencies gives an image without a carrier.
     """
     first, last = math.ceil(low / step), math.floor(high / step)
     return np.arange(first, last + 1, dtype=float) * step

@@ -40,7 +40,7 @@ def flown(source: ErrorSource, size: float, geometry: BistaticGeometry, aperture
 def _path_error(
     source: ErrorSource, size: float, platform_index: int, path: PlatformState, aperture_time_s: float
 ) -> PathError:
-    """Convert an error to the error of the path of one platform, in the field that the kind of the error names."""
+    """Convert a declared error to a `PathError` of one platform. The kind of error determines which field is set."""
     kind, fields = source.kind, dict[str, Any]()
     if isinstance(kind, MotionKind):
         times = np.linspace(-aperture_time_s / 2, aperture_time_s / 2, _MOTION_SAMPLES)

@@ -1,8 +1,9 @@
-"""Simulated flights of an inertial unit that GNSS fixes aid: position errors of the filter or of the smoother.
+"""Simulated flights with an inertial unit aided by GNSS fixes: position errors of the filter or of the smoother.
 
-Every flight draws the errors of the inertial unit and of each fix, and runs the filter on them. The smoother then
-corrects the flight backwards, with the innovations that were drawn. The flights check the joint covariance of
-`navigation.smoother`, so they do not use its formulas: the steps are integrated by series and by quadrature.
+For every flight, the errors of the inertial unit and of each fix are drawn, and the filter is applied to them. The
+smoother then corrects the estimates backwards in time, with the innovations of this flight. The flights are an
+independent check of the joint covariance from `navigation.smoother`. They do not use its formulas: the transition of
+a step is computed from a series, and its noise by quadrature.
 """
 
 import math
@@ -27,10 +28,11 @@ _FLIGHT_COUNT = 500  # flights that are simulated together
 
 
 def navigation_courses(mission: Mission, name: str, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-    """Draw position errors of a platform's aided navigation within an aperture, for one sigma, (draws, times, 3). [m]
+    """Draw position errors of a platform's aided navigation within an aperture, (draws, times, 3). [m]
 
-    `times` (times,) are slow times within the aperture. [s] The errors are those of the antenna, east, north and up.
-    The `level` of the file scales them.
+    `times` (times,) [s] are slow times within the aperture. The result holds the errors of the antenna position:
+    east, north and up. They have the declared size, including the `level` in the mission file, without the coverage
+    factor.
     """
     navigation: Navigation = getattr(mission.platforms, name).motion_error.navigation
     flights = _Flights(mission, name, navigation)
@@ -42,9 +44,10 @@ def navigation_courses(mission: Mission, name: str, times: Floats, draws: int, r
 
 @dataclass(frozen=True)
 class _Step:
-    """A step of the flight: its transition, a factor of its noise, and the gain of the fix at its end.
+    """A step of the flight: transition of the state, process noise, and gain of a fix at the end of the step.
 
-    `gain` and `inverse` are None without a fix. `inverse` is the inverse covariance of the innovation.
+    `noise` is a factor F of the noise covariance FFᵀ. `inverse` is the inverse covariance of the innovation. `gain`
+    and `inverse` are None if there is no fix.
     """
 
     transition: Floats
@@ -54,7 +57,7 @@ class _Step:
 
 
 class _Flights:
-    """Flights of one platform: steps between moments, and the filter that all flights share."""
+    """Simulated flights of one platform, divided into steps. All flights share the gains of the filter."""
 
     def __init__(self, mission: Mission, name: str, navigation: Navigation) -> None:
         half = mission.collection.aperture_time / 2
@@ -84,7 +87,10 @@ class _Flights:
         self._steps(moments, flight.body[:, 0], flight.force[:, 0])
 
     def _steps(self, moments: Floats, body: Floats, force: Floats) -> None:
-        """Run the filter once: transitions, noise and gains of all steps, and covariances at the moments shown."""
+        """Run the filter once, and store the transition, noise and gain of each step.
+
+        The covariance at the beginning of the flight and after each step is stored for the smoother.
+        """
         gnss, measured = self.navigation.gnss, np.zeros((6, self.size))
         measured[:6, :6] = np.eye(6)
         position = np.array(gnss.position or ())
@@ -114,7 +120,7 @@ class _Flights:
             self.covariances.append(P)
 
     def _start(self) -> Floats:
-        """Sigmas of the state at the start of the flight."""
+        """Standard deviations of the errors of the state at the start of the flight."""
         imu, sigmas = self.navigation.imu, StartSigmas(heading_rad=np.array([self.navigation.heading]))
         bias = np.array(imu.accelerometer_bias or ())
         if imu.accelerometer_scale_factor is not None:
@@ -124,12 +130,18 @@ class _Flights:
         return np.array([*start, *(self.navigation.gnss.position or ())] if self.wanders else start, float)
 
     def _gain(self, P: Floats) -> tuple[Floats, Floats]:
-        """Gain of a fix, and the inverse covariance of its innovation."""
+        """Filter gain of a fix, and the inverse covariance of its innovation.
+
+        `P` is the covariance of the state before the fix.
+        """
         inverse = np.linalg.inv(self.measured @ P @ self.measured.T + np.diag(np.square(self.sigmas)))
         return np.asarray(P @ self.measured.T @ inverse), np.asarray(inverse, float)
 
     def _moved(self, duration: float, body: Floats, force: Floats) -> tuple[Floats, Floats]:
-        """Transition of a step by its series, and the covariance of its noise by Gauss–Legendre quadrature."""
+        """Transition matrix of a step, and the covariance of its process noise.
+
+        The matrix is computed from the series of the exponential, and the covariance by Gauss–Legendre quadrature.
+        """
         imu, rate = self.navigation.imu, np.zeros((self.size, self.size))
         rate[0:3, 3:6] = rate[6:9, 12:15] = np.eye(3)
         rate[6:9, 12:15] = rate[3:6, 9:12] = body
@@ -153,7 +165,10 @@ class _Flights:
         return _exponential(rate * duration), noise
 
     def drawn(self, draws: int, rng: np.random.Generator) -> Floats:
-        """Draw flights, and return their position errors at the moments shown, (draws, shown, 3). [m]"""
+        """Draw flights, and return the position errors of the antenna in the aperture, (draws, shown, 3). [m]
+
+        The attribute `shown` holds the slow times of the errors.
+        """
         errors, innovations = self._filtered(draws, rng)
         if self.navigation.is_smoothed:
             shown = self._smoothed(errors, innovations)
@@ -169,11 +184,14 @@ class _Flights:
 
     @staticmethod
     def _at_antenna(error: Floats) -> Floats:
-        """Errors of the state that move the antenna: position and tilt, (draws, 6)."""
+        """Select the errors of the state that displace the antenna: position and tilt, (draws, 6)."""
         return np.concatenate((error[:, :3], error[:, 6:9]), axis=1)
 
     def _filtered(self, draws: int, rng: np.random.Generator) -> tuple[Sequence[Floats], Sequence[Floats | None]]:
-        """Errors of the filter after each moment, and the innovation of each fix."""
+        """Draw the errors of the filter at the start and after each step, and the innovation of each fix.
+
+        An innovation is None for a step that does not end with a fix.
+        """
         error = self.start * rng.standard_normal((draws, self.size))
         innovations: list[Floats | None] = [None]
         if self.first_gain is not None:
@@ -193,7 +211,7 @@ class _Flights:
         return error - innovation @ gain.T, innovation
 
     def _smoothed(self, errors: Sequence[Floats], innovations: Sequence[Floats | None]) -> list[Floats]:
-        """Errors of the smoother that move the antenna, at the moments shown."""
+        """Errors of the smoother in position and tilt, at each of the times `shown` in the aperture."""
         adjoint, shown = np.zeros_like(errors[0]), list[Floats]()
         for moment in range(len(errors) - 1, -1, -1):
             if self.is_shown[moment]:
@@ -208,7 +226,7 @@ class _Flights:
 
 
 def _exponential(matrix: Floats) -> Floats:
-    """Exponential of a matrix with small elements, by its series."""
+    """Exponential of a matrix with small elements, computed from its power series."""
     total, power = np.eye(len(matrix)), np.eye(len(matrix))
     for order in range(1, 7):
         power = power @ matrix / order
@@ -217,7 +235,10 @@ def _exponential(matrix: Floats) -> Floats:
 
 
 def _square_root(covariance: Floats) -> Floats:
-    """Factor F of a covariance, with FFᵀ equal to it; the states may have very different sizes."""
+    """Factor F of a covariance matrix, such that FFᵀ is the matrix.
+
+    The states are scaled to unit variance first, because they may have very different sizes.
+    """
     sigmas = np.sqrt(np.diagonal(covariance))
     units = np.where(sigmas > 0, sigmas, 1.0)
     squares, ways = np.linalg.eigh(covariance / np.multiply.outer(units, units))

@@ -80,15 +80,15 @@ def _kernel(offset: Floats) -> Floats:
 
 
 def _carrier_of(cut: Complexes) -> int:
-    """Signed FFT bin at the centre of gravity of the power spectrum, summed over all cuts (..., samples)."""
+    """Signed FFT bin at the centre of gravity of the summed power spectra of all cuts (..., samples)."""
     return _carrier(np.abs(np.fft.fft(cut).reshape(-1, cut.shape[-1])) ** 2)
 
 
 def _carrier(power: Floats) -> int:
     """Signed FFT bin at the centre of gravity of the sum of power spectra (lines, bins).
 
-    The spectrum is periodic, so its bins are treated as points on a circle, and the empty bins are opposite to the
-    result.
+    The spectrum is periodic, so its bins are treated as points on a circle. The result is therefore opposite to the
+    empty part of the spectrum.
     """
     count = power.shape[1]
     turn = np.exp(2j * math.pi * np.arange(count) / count)

@@ -62,7 +62,7 @@ def orbit_error(
     positions, velocities = (np.stack((state, state)) for state in ((r, wrong_r), (v, wrong_v)))
 
     def fallen(there: Floats, half_steps: int) -> Floats:
-        """Acceleration in the inertial axes of mid-aperture, for both orbits at the positions `there`. [m/s²]
+        """Accelerations on both orbits at the positions `there`, in the inertial axes of mid-aperture. [m/s²]
 
         `half_steps` is the time, counted in half integration steps from mid-aperture.
         """
@@ -119,7 +119,7 @@ def _gravity(positions: Floats, rotation: Floats) -> Floats:
 
 
 def _turned_by(rotation: Floats, times: Floats) -> Floats:
-    """Rotation matrices (times, 3, 3) for rotations over `times` [s] with the angular velocity `rotation`. [rad/s]"""
+    """Rotation matrices (times, 3, 3) for rotations over `times` [s] with the angular velocity `rotation` [rad/s]."""
     rate = float(np.linalg.norm(rotation))
     if rate == 0:
         return np.broadcast_to(np.eye(3), (times.size, 3, 3))

@@ -1,4 +1,4 @@
-"""Bistatic phase history of point scatterers, computed from exact ranges by (1) to (3) of Rigling & Moses.
+"""Bistatic phase history of point scatterers from exact ranges, as in equations (1) to (3) of Rigling & Moses.
 
 The simulator is used to check the series expansions of the budget, so it uses no Taylor series itself. Frame: scene
 centre at the origin, x east, y north, z up. All quantities are in SI units.
@@ -88,15 +88,15 @@ class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): a polynomial, and faster errors.
 
     The polynomial is equation (22) of Rigling & Moses. Its errors of position [m], velocity [m/s] and acceleration
-    [m/s²] are in east-north-up. So is `course` [m], an error with an arbitrary time history. Noise, and vibrations
-    for which no axis is given, are along the line of sight, positive away from the scene. The errors of position,
-    velocity and acceleration apply at mid-aperture. For a platform in free fall, they are the initial errors of the
-    measured orbit. For any other platform, they are the coefficients of a polynomial of time. `height` [m] is the
-    error of the assumed scene height, positive if the scene is assumed too high. A height error raises the measured
-    path of a platform; the path of a platform in orbit is not affected. `time_tag` [s] is the delay of the time tags:
-    the measured position at a time τ is the true position at τ plus the delay. `wideband_rms` [m] is the rms position
-    noise of the pulses, which is white, or limited to the band `wideband_band` (low, high) [Hz]. Simulating it
-    requires a random generator.
+    [m/s²] have the components east, north and up. The same applies to `course` [m], an error with an arbitrary time
+    history. Noise, and vibrations for which no axis is given, are along the line of sight, positive away from the
+    scene. The errors of position, velocity and acceleration apply at mid-aperture. For a platform in free fall, they
+    are the initial errors of the measured orbit. For any other platform, they are the coefficients of a polynomial of
+    time. `height` [m] is the error of the assumed scene height, positive if the scene is assumed too high. A height
+    error raises the measured path of a platform; the path of a platform in orbit is not affected. `time_tag` [s] is
+    the delay of the time tags: the measured position at a time τ is the true position at τ plus the delay.
+    `wideband_rms` [m] is the rms position noise of the pulses, which is white, or limited to the band `wideband_band`
+    (low, high) [Hz]. Simulating it requires a random generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -188,7 +188,10 @@ def superposed(errors_of_sources: Iterable[Errors]) -> Errors:
 
 
 def _sum(course: Course | None, other: Course | None) -> Course | None:
-    """Sum of two errors over time. None counts as zero; the sum is None if both are None."""
+    """Sum of two errors, each of which is a function of slow time.
+
+    None counts as zero; the sum is None if both are None.
+    """
     return course.plus(other) if course is not None and other is not None else course or other
 
 
@@ -482,7 +485,7 @@ def phase_history(
     clock_error : (pulses,) ndarray or float
         Clock error t̃(τ) of equation (1). [s]
     electrons : (pulses,) ndarray, optional
-        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer [s·Hz²]. None means no delay.
+        Delay due to free electrons at a frequency of 1 Hz, the same for every scatterer [s·Hz²]. None means no delay.
     noise_power : float
         Variance of the circular white Gaussian noise of a sample. A scatterer of amplitude 1 has a power of 1.
     rng : numpy Generator, optional

@@ -109,8 +109,8 @@ class PointImages(NamedTuple):
     `effect` and `range_error` are for a point at the scene centre. `range_error` is the range error over `slow_time`
     without its constant and linear part. `segments` (3, 2) holds its value [m] and slope [m/s] at the three
     `segment_times`. `points` (3, 2) holds the ground points that equation (29) gives for these three segments of the
-    full range error, computed with the gradients named by `points_by`. The scene centre appears at the second of
-    these points, by equation (25).
+    full range error, computed with the gradients named by `points_by`. According to equation (25), the scene centre
+    appears at the second of these points.
 
     `responses` has one entry for each target. `clean_response`, `response` and `focused_response` are cuts through
     the peaks of the brightest target. `rows` are the rows of these peaks in the images. `misread_db` [dB] is the
@@ -242,8 +242,8 @@ def simulate_point(
         Point targets and clutter of the scene. Clutter consists of a random scatterer for each resolution cell of the
         patch.
     foreseen : callable, optional
-        Called before the images are formed, with the estimated time [s] for this. The estimate is made from a trial
-        with a few pulses and pixels, which is omitted if `foreseen` is None.
+        Called before the images are formed, with the estimated time [s] needed to form them. The estimate is made
+        from a trial with a few pulses and pixels, which is omitted if `foreseen` is None.
 
     Raises
     ------
@@ -490,7 +490,7 @@ def _plan(
     The sizes follow from the remaining range error [m] and its slope [m/s] over slow time. `shown` and `scene_shown`,
     (targets, 2) [m], are the ground points at which the two image formers show the targets. On a grid along lines of
     equal range and of equal Doppler, the band of a response is a rectangle and its smear is along y′. In the image
-    along (x, y) both are rotated.
+    along (x, y), the rectangle and the smear are rotated.
     """
     T, radar = mission.collection.aperture_time, mission.radar
     centre, scene_centre = _middle(shown), _middle(scene_shown)
@@ -570,9 +570,10 @@ def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
 def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
     """Sinusoidal motions of a platform that represent one declared vibration.
 
-    `entry` is the index of the vibration in the list of the mission file. If its displacement is declared along three
-    axes, there is a motion along each axis. If it is a single number, the motion is along the line of sight. The
-    phases of the axes are chosen so that the motions add up along the line of sight at mid-aperture.
+    `entry` is the index of the vibration in the list of the mission file. If the displacement of the vibration is
+    declared along three axes, there is a motion along each axis. If the displacement is a single number, the motion
+    is along the line of sight. The phases of the axes are chosen so that the motions add up along the line of sight
+    at mid-aperture.
     """
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
@@ -633,11 +634,12 @@ def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseRe
 def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> tuple[Floats, Complexes]:
     """Random scatterers of clutter over a patch: positions (n, 2) [m] and circular normal amplitudes (n,).
 
-    There is one scatterer for each resolution cell. The area of a cell is the energy of a response whose peak is 1,
-    so `level_db` is the mean power of a pixel. Both results are empty if `level_db` is None. A range cell has `finer`
-    times as many pixels as a cross-range cell. If `finer` is above 1, scatterers up to a range cell beyond the patch
-    are included, because their responses extend into it. These scatterers are out of focus; with each line of
-    distance from the patch, their blur in cross-range increases by several cells.
+    There is one scatterer for each resolution cell. The area of a cell equals the energy of a response with a peak of
+    1, which is its power integrated over the ground; `level_db` is therefore the mean power of a pixel. Both results
+    are empty if `level_db` is None. A range cell has `finer` times as many pixels as a cross-range cell. If `finer`
+    is above 1, scatterers up to a range cell beyond the patch are included, because their responses extend into it.
+    These scatterers are out of focus; with each line of distance from the patch, their blur in cross-range increases
+    by several cells.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)

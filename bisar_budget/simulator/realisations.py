@@ -65,7 +65,7 @@ _MAX_FLOWN_STEPS = 1 << 19  # of phase noise; beyond, fast tones are interpolate
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Draw the position errors of the platforms due to a random error of its declared size.
+    """Draw the position errors of the platforms that a random error causes.
 
     The error is an error of an inertial sensor or of a lever arm, or correlated position noise. Its standard
     deviation is the declared size without the coverage factor. The keys of the result are the names of the platforms.
@@ -172,7 +172,7 @@ def _arm_motions(
 def _navigation_motions(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Motions]:
-    """Draw the errors of an aided navigation, from simulated flights."""
+    """Draw the position errors of a platform with aided navigation, from simulated flights."""
     courses = navigation_courses(mission, error.owner, times, draws, rng)
     return {error.owner: [(courses[..., axis], direction) for axis, direction in enumerate(np.eye(3))]}
 
@@ -193,12 +193,12 @@ _MOTION_DRAWS: Mapping[
 def _drawn_by_axis(
     motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Floats, Floats]]:
-    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component of the figure is 1.
+    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component is 1.
 
-    `figure` is a figure of the data sheet, such as the gyro bias. Yields the index of the axis, the position error,
-    (draws, times), and the tilt, (draws, times). The position error is computed as if one unit of the sensor error
-    caused an acceleration error of 1 m/s². To obtain the actual position error, the caller multiplies it by the
-    acceleration error per unit. An axis without an error is omitted.
+    `figure` is a data-sheet value of the sensor, such as the gyro bias; its components are the values for the three
+    axes. Yields the index of the axis, the position error (draws, times), and the tilt (draws, times). The position
+    error is computed as if one unit of the sensor error caused an acceleration error of 1 m/s². To obtain the actual
+    position error, the caller multiplies it by the acceleration error per unit. An axis without an error is omitted.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.key, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):
@@ -278,7 +278,7 @@ def has_unset_clocks(mission: Mission) -> bool:
 
 
 def drawn_errors(analysis: Analysis) -> Errors:
-    """Draw a time series of each declared error of sensors, clocks and the atmosphere, and combine them for an image.
+    """Draw time series of the declared errors of sensors, clocks and the atmosphere, and combine them for an image.
 
     The random numbers are drawn with the seed of the mission. Each series is multiplied by the coverage factor. The
     phase of an oscillator includes the error with which it was set before the aperture. Its mean and slope are
@@ -323,7 +323,7 @@ class _DrawnErrors:
         self._air = dict.fromkeys(DELAYS, np.zeros(times.size))
 
     def add_motion(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw motion due to a sensor, a lever arm or position noise, and store it with the other motions."""
+        """Draw motion due to a sensor error, a lever-arm error or position noise, and add it to the motions."""
         for name, series in position_courses(self.mission, error, self.times, 1, rng).items():
             self._motions.append((name, Course(self.times, self.factor * series[0])))
 
@@ -333,7 +333,7 @@ class _DrawnErrors:
         self._air[error.subject.axis] = self._air[error.subject.axis] + group
 
     def add_vibration(self, error: RandomError, rng: np.random.Generator) -> None:
-        """Draw random vibration of a platform along the line of sight, and store it with the other motions."""
+        """Draw random vibration of a platform along the line of sight, and add it to the motions."""
         mission, times = self.mission, self.noise_times
         line_of_sight_error = (
             phase_courses(mission, error, times, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
@@ -471,7 +471,7 @@ def phase_courses(
     rng: np.random.Generator,
     highest: float = math.inf,
 ) -> Floats:
-    """Draw the phases at the centre frequency due to a random error of its declared size, (draws, times). [rad]
+    """Draw the phases at the centre frequency that a random error causes, (draws, times). [rad]
 
     The error is an error of an oscillator or of the synchronisation link, or a vibration. Its standard deviation is
     usually the declared size without the coverage factor; for the noise of an oscillator and for a vibration,
@@ -618,10 +618,10 @@ def _between_exchanges(
 ) -> Floats:
     """Draw phases, and subtract straight lines between their values at successive pulse exchanges. [rad]
 
-    The result is (draws, times). The phases are sums of tones, whose period is a whole number of exchange intervals.
-    The spacing of `times` is changed slightly, so that it also divides the period evenly. The relative change is less
-    than the ratio of the spacing to the period. `turn_phases`, if not empty, holds additional phases as functions of
-    slow time, one function for each draw.
+    The result is (draws, times). The phases are sums of tones, whose common period is a whole number of exchange
+    intervals. The spacing of `times` is changed slightly, so that it also divides the period evenly. The relative
+    change is less than the ratio of the spacing to the period. `turn_phases`, if not empty, holds additional phases
+    as functions of slow time, one function for each draw.
     """
     step = min(interval, _FAR_FACTOR * aperture_time)
     exchanges = max(_MIN_EXCHANGES_COUNT, math.ceil(_PERIOD_FACTOR * aperture_time / step))
@@ -832,9 +832,9 @@ def powers_at(powers: Floats, count: int) -> Floats:
     """Powers of the harmonics 0 … count // 2 that replace harmonics 1, 2 … at `count` samples, (count // 2 + 1,).
 
     The replaced harmonics have random phases and the powers `powers`. The samples are evenly spaced over the period.
-    Their covariance is the same with the new harmonics. At sample n, harmonic k has the phase 2πkn/count. Harmonic k
-    + count has the same phase, and harmonic count − k has the opposite phase, which is equivalent if phases are
-    random. The powers of such harmonics are therefore added.
+    The covariance of the samples is the same with the new harmonics. At sample n, harmonic k has the phase
+    2πkn/count. The harmonic k + count has the same phase. The harmonic count − k has the opposite phase, which is
+    equivalent if phases are random. The powers of such harmonics are therefore added.
     """
     folded = _folded(powers, count)
     one_sided: Floats = folded[: count // 2 + 1].copy()
@@ -846,10 +846,10 @@ class _Tones:
     """Tones that represent a phase spectrum: fast tones in equal frequency steps, slow tones in finer steps.
 
     Fast tones are the harmonics of 1/`period`, where `period` [s] is by default four apertures. Slow tones have lower
-    frequencies, in logarithmic steps, unless the edges of their frequency intervals [Hz] are given by `slow`. A
-    narrow piece of the spectrum, which would contain only a few fast tones, is represented by tones of its own; these
-    follow the slow tones in the arrays. Noise at frequencies above the fast tones is independent at each time, with
-    the standard deviation `rest` [rad].
+    frequencies. Their frequency intervals have the edges `slow` [Hz], or are logarithmic if `slow` is None. A narrow
+    piece of the spectrum, which would contain only a few fast tones, is represented by tones of its own; these follow
+    the slow tones in the arrays. Noise at frequencies above the fast tones is independent at each time, with the
+    standard deviation `rest` [rad].
     """
 
     def __init__(

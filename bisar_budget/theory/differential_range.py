@@ -46,7 +46,7 @@ def distance(one: Matrix, other: Matrix) -> Expr:
 
 
 def observed_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORM_SYMBOLS) -> Expr:
-    """Observed differential range ΔR̂_m of the scatterer m, by equation (1). [m]
+    """Observed differential range ΔR̂_m of the scatterer m, as in equation (1). [m]
 
     It is the sum of the true distances from the platforms to the scatterer, minus the sum of the measured distances
     to the scene centre, plus the clock error c·t̃.
@@ -117,7 +117,7 @@ def hold_range_constant(expression: Expr) -> Expr:
 
 
 def linear_differential_range() -> tuple[Expr, Expr]:
-    """Constant and linear coefficients β₀ [m] and β₁ [m/s] of the differential range, by equation (17).
+    """Constant and linear coefficients β₀ [m] and β₁ [m/s] of the differential range, from equation (17).
 
     In the printed equation, the plus sign between the two brackets is missing.
     """
@@ -134,7 +134,7 @@ def coefficients(expression: Expr) -> tuple[Expr, ...]:
 
 
 def error_polynomial(platform: PlatformSymbols) -> Matrix:
-    """Position error r̃(τ) = p̃ + ṽτ + ãτ²/2 of a platform, by equation (22), as a vector of shape (3,). [m]"""
+    """Position error r̃(τ) = p̃ + ṽτ + ãτ²/2 of a platform, from equation (22), as a vector of shape (3,). [m]"""
     return platform.position_error + platform.velocity_error * tau + platform.acceleration_error * tau**2 / 2
 
 

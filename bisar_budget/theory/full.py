@@ -134,7 +134,7 @@ def direct_sight(platform: PlatformSymbols) -> Matrix:
 
 
 def ground_history() -> tuple[Matrix, ...]:
-    """Derivatives of orders 0 to 4 at τ = 0 of s, the horizontal components of u_t + u_r, each of shape (2,). [1/sⁿ]
+    """Derivatives of orders 0 to 4 at τ = 0 of the vector s (2,), the horizontal part of u_t + u_r. [1/sⁿ]
 
     The range of a ground point x relative to the scene centre is −s(τ)·x.
     """

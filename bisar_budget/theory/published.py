@@ -159,7 +159,7 @@ def edge_phase(beta: Expr, order: int) -> Expr:
 
 
 def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
-    """Largest allowable magnitude of an error: the magnitude for which its phase `phase` reaches `budget`.
+    """Largest allowable magnitude of an error: the magnitude at which the phase `phase` reaches `budget`.
 
     `phase` must be linear in the error.
     """
@@ -324,7 +324,7 @@ def unrotated(x: Expr, y: Expr) -> Matrix:
 def exponent(products: Expr) -> Expr:
     """Exponent −jΦ of the far-field matched filter, with the phase Φ of equation (2).
 
-    `products` is x·f_x + y·f_y + z·f_z. By equations (6) and (8) it equals −f·ΔR/2.
+    `products` is x·f_x + y·f_y + z·f_z. According to equations (6) and (8), this sum equals −f·ΔR/2.
     """
     together = real("products")
     return (-I * phase(-2 * together / f_i)).subs(together, products)

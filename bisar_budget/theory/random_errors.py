@@ -138,7 +138,7 @@ def walk(order: int) -> Moments:
 def constant(order: int) -> Moments:
     """Moments of the function τⁿ/n! with n = `order`, for an aperture T = 1.
 
-    This is the position error of a constant acceleration (n = 2) or of a constant rate of acceleration (n = 3).
+    This is the position error due to a constant acceleration (n = 2) or to a constant rate of acceleration (n = 3).
     """
     history = (_x / 2) ** order / factorial(order)
     squares = tuple(
@@ -277,7 +277,7 @@ def tone() -> Moments:
 
 
 def tone_place() -> tuple[Expr, Expr]:
-    """Amplitudes of the constant part, and of the linear part at the aperture edge, of a tone of amplitude 1."""
+    """Amplitudes, at the aperture edge, of the constant and the linear part of a tone of amplitude 1."""
     return spherical_bessel(0), 3 * spherical_bessel(1)
 
 

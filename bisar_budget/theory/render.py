@@ -306,7 +306,7 @@ _TITLE = "Equations of Rigling & Moses"
 def _heading(equation: Equation) -> str:
     """Number and title of an equation.
 
-    For an equation of the paper, the text also tells whether it is a definition or derived by SymPy.
+    For an equation of the paper, the text also tells whether the equation is a definition or was derived by SymPy.
     """
     return f"{equation.number} {equation.title} [{equation.origin}]" if equation.number else equation.title
 

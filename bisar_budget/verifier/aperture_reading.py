@@ -58,8 +58,8 @@ class ApertureReading(NamedTuple):
     `across_pixels` is the offset of the response from the middle of the image along y′. This offset follows from the
     linear part of the phase. `walked_pixels` is the offset of the response's centre of gravity along x′ that is due
     to the quadratic and higher parts of the phase: a pulse at slow time τ contributes at the range e(τ) − τ·e′(τ),
-    where e is the range error. `coverage` is the fraction of the aperture whose response is within the patch. It is 1
-    unless the smeared response extends beyond the patch.
+    where e is the range error. `coverage` is the fraction of the aperture whose response is within the patch. It is
+    less than 1 if the smeared response extends beyond the patch, and 1 otherwise.
     """
 
     quadratic: float

@@ -139,10 +139,10 @@ def _order(vibration: Subject) -> tuple[int, int]:
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
-    """For each limited row of sensors, clocks and sidelobes, yield its id and a function that verifies the limit.
+    """Yield the id of each row with a limit on sensors, clocks or sidelobes, and a function that verifies the limit.
 
-    The rows are about random errors, errors whose size the mission file gives as an ISLR, oscillator tones, PSLR, and
-    ISLR.
+    These are the rows of random errors, of errors whose size the mission file gives as an ISLR, of oscillator tones,
+    of the PSLR and of the ISLR.
     """
     for error in study.analysis.random:
         sizes = limits_of(study, error)

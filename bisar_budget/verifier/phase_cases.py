@@ -96,7 +96,7 @@ def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
-    """Verify the limit on an error if its cubic phase or its displacement sets the limit, not its quadratic phase."""
+    """Verify the limit on an error if the limit is set by the cubic phase or the displacement of the error."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
     blank = study.blank(source.id, size, source.unit)
@@ -309,7 +309,7 @@ def compare(excess: float, tolerance: float) -> str:
 
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement (east, north) due to several errors together, by equation (25) of Rigling & Moses. [m]
+    """Displacement (east, north) due to several errors together, from equation (25) of Rigling & Moses. [m]
 
     `scale` multiplies the sizes of the errors. The result is None if equation (25) has no solution.
     """
@@ -385,7 +385,7 @@ def _through_the_limit(
 
 
 def _of_response(study: Study, images: Responses, reading: ApertureReading) -> VerdictFields:
-    """Return the fields of a verdict that describe a response: displacement, smear, and figures from a cut.
+    """Return the fields of a verdict that describe a response: displacement, smear, and measures of a cut.
 
     The cut goes through the response across range. Quantities that cannot be determined, because the smear is long or
     the patch is curved, are omitted.
@@ -414,8 +414,9 @@ def _of_response(study: Study, images: Responses, reading: ApertureReading) -> V
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
     """Measure the equal-loss quadratic phase in an image that contains several errors. [rad]
 
-    `scale` multiplies the sizes of the errors. The result is None if the image cannot be formed or its phase cannot
-    be measured.
+    The equal-loss quadratic phase is the purely quadratic phase that would reduce the peak as much as the errors do,
+    apart from the loss due to the cubic phase and higher orders; see `Study.equal_loss`. `scale` multiplies the sizes
+    of the errors. The result is None if the image cannot be formed or its phase cannot be measured.
     """
     try:
         images = study.images(study.together(sizes, scale), READ_CELLS)
@@ -425,9 +426,10 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
 
 
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
-    """Find the common factor of all errors for which their cubic phase from exact ranges equals the requirement.
+    """Find the factor by which all errors must be multiplied for their cubic phase to equal the requirement.
 
-    `scale` is a first guess of the factor.
+    The cubic phase is computed from exact ranges. `scale` is a first guess of the factor, and `requirement` [rad] is
+    the required cubic phase.
 
     Raises
     ------
@@ -513,10 +515,11 @@ def location(study: Study, requirement: float) -> Verdict:
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
-    """Find the common factor of all errors for which their displacement by the gating model equals the requirement.
+    """Find the factor by which all errors must be multiplied for their displacement to equal the requirement.
 
-    The result is None if the errors together do not displace the image, or if the gating model, which decides the
-    verdict, is the published model and equation (25) of Rigling & Moses has no solution.
+    The displacement is computed by the gating model, which decides the verdict. The result is None if the errors
+    together do not displace the image. It is also None if the gating model is the published model and equation (25)
+    of Rigling & Moses has no solution.
     """
     if not study.is_full:
         displacement = published_displacement(study, sizes, 1.0)

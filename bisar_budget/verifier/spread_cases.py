@@ -310,9 +310,9 @@ def measured_power(
 
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
-    """Sizes at which a random error reaches its limits without autofocus, by the name of the limiting requirement.
+    """Sizes at which a random error reaches its limits without autofocus, in the unit of the error.
 
-    The sizes are in the unit of the error. The result is empty if no requirement limits the error.
+    The keys are the names of the limiting requirements. The result is empty if no requirement limits the error.
     """
     model = _model(study, error)
     effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
@@ -592,9 +592,10 @@ def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator)
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Draw noise of a position, and return its smooth part at the nodes of exact ranges, by platform. [m]
+    """Draw position noise, and return its smooth part at the slow times for which exact ranges are computed. [m]
 
-    Each array is (draws, nodes, 3). `_smooth_at_nodes` defines the smooth part.
+    The keys of the result are the names of the platforms. Each array is (draws, nodes, 3); the nodes are these slow
+    times. `_smooth_at_nodes` defines the smooth part.
     """
     T = study.collection.aperture_time
     times = _moments(study, _SERIES_SAMPLES)
@@ -613,10 +614,11 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
 
 
 def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
-    """Matrix (nodes, times) that converts values at slow times to their smooth part at the nodes of exact ranges.
+    """Matrix (nodes, times) that converts values at slow times `times` [s] to their smooth part at the nodes.
 
-    The smooth part is a least-squares fit of Legendre polynomials up to the order `SMOOTH_ORDER`. Without this fit,
-    the phase of noise with a short correlation time would be overestimated, because the nodes are far apart.
+    The nodes are the slow times for which exact ranges are computed. The smooth part is a least-squares fit of
+    Legendre polynomials up to the order `SMOOTH_ORDER`. Without this fit, the phase of noise with a short correlation
+    time would be overestimated, because the nodes are far apart.
     """
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
@@ -642,7 +644,7 @@ def _moments(study: Study, count: int) -> Floats:
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
     """Draw a few time series of a random error, and convert them to errors that the simulator applies to images.
 
-    Only Legendre orders up to the cubic are kept, because higher orders spread power and would mask the response.
+    Only the Legendre orders 0 to 3 are kept, because higher orders spread power and would mask the response.
     """
     return _IMAGE_ERRORS[error.kind.drawn_as](study, error, _moments(study, _SERIES_SAMPLES), rng)
 

@@ -114,7 +114,7 @@ class Study:
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Models whose limits are verified: the model that decides the status, or both models for `strictest`."""
+        """Models whose limits are verified: the model that decides the status, or for `strictest` both models."""
         return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
@@ -180,7 +180,7 @@ class Study:
 
         `courses` maps the name of a platform to its motion errors, (draws, nodes, 3) [m], and "clock" to range
         errors, (draws, nodes) [m]. The slow times of the nodes are given by `aperture_nodes`. The fields of the
-        result are (draws,). They are NaN for a draw if no ground point has its range history.
+        result are (draws,). If no ground point has the range history of a draw, they are NaN for this draw.
         """
         exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         courses_by_draw = {name: np.ascontiguousarray(course.T) for name, course in courses.items()}
@@ -190,7 +190,7 @@ class Study:
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:
-        """Sign of the errors, 1 or -1, for which the equal-loss quadratic phase is larger.
+        """Sign of the errors, 1 or -1, that gives the larger equal-loss quadratic phase (see `equal_loss`).
 
         Raises
         ------
@@ -208,7 +208,7 @@ class Study:
         return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
-        """Scale declared errors until the sum of their quadratic phases equals a budget. [rad]
+        """Scale declared errors until the sum of their quadratic phases equals `budget` [rad].
 
         The phases are computed by the model that decides the mission's status. Returns pairs of an error and its
         scaled size. The signs of the sizes are chosen so that the phases add. The list is empty if no error has a
@@ -238,9 +238,10 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Equal-loss quadratic phase of an error in a model, for the sign of the error with the larger phase. [rad]
+        """Equal-loss quadratic phase of an error, computed by a model for the sign that gives the larger phase. [rad]
 
-        The result has the sign of the quadratic phase of a small error. It is infinite if the phase is not finite.
+        The method `equal_loss` describes this phase. The result has the sign of the quadratic phase of a small error.
+        It is infinite if the phase is not finite.
         """
         effect = model.does(source, size)
         return math.copysign(effect.equal_loss, effect.qpe) if math.isfinite(effect.qpe) else math.inf
@@ -407,5 +408,8 @@ class Study:
 
 
 def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
-    """Variance over the aperture of the equal-loss quadratic phase, and of the cubic and higher phases. [rad²]"""
+    """Variances over the aperture of the equal-loss quadratic phase, and of the cubic and higher phases. [rad²]
+
+    The equal-loss quadratic phase is described in `Study.equal_loss`.
+    """
     return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2

@@ -149,12 +149,49 @@ def long_aperture(correlation_time: str, zenith_delay: str) -> Document:
     return document
 
 
+NAVIGATION = {
+    "imu": {
+        "accelerometer_bias": "5 mg",
+        "accelerometer_scale_factor": "1000 ppm",
+        "gyro_bias": "50 deg/h",
+        "velocity_random_walk": "0.03 m/s/sqrt(h)",
+        "angle_random_walk": "0.3 deg/sqrt(h)",
+        "source": "data sheet",
+    },
+    "gnss": {
+        "position": "0.3 mm",
+        "velocity": "2 mm/s",
+        "rate": "5 Hz",
+        "correlation_time": "20 s",
+        "source": "data sheet",
+    },
+    "heading": "10 deg",
+    "method": "filtered",
+    "before": "10 s",
+    "after": "0 s",
+    "outages": [{"from": "-1 s", "to": "0.5 s"}],
+    "level": "1 dB",
+    "source": "test",
+}
+
+
+def aided() -> Document:
+    """A receiver whose inertial unit GNSS aids, and nothing else that such a navigation replaces."""
+    document = with_errors(WIDEBAND, timing_error=TERMS)
+    error = document["platforms"]["receiver"]["motion_error"]
+    document["platforms"]["receiver"]["motion_error"] = {
+        key: value for key, value in error.items() if key not in ("imu", "random")
+    } | {"navigation": copy.deepcopy(NAVIGATION)}
+    return document
+
+
 LEGS = {"propagation": {"transmitter": AIR, "receiver": AIR}}
 DOCUMENTS = {
     "holdover": with_errors(MOTION["vibration"], synchronization=HOLDOVER),
     "exchanged": with_errors(WIDEBAND, synchronization=EXCHANGED, **LEGS),
     "terms": with_errors(WIDEBAND, timing_error=TERMS),
     "long": long_aperture("10 min", "2 mm"),
+    "aided": aided(),
 }
 OMITTED_IS_WIDEST = "distribution"  # normal; bounds along other axes than the file's add, sigmas do not
 SECTIONS = ("common_motion_error", "propagation", "other_errors", "synchronization", "timing_error")
@@ -259,7 +296,9 @@ def test_the_files_state_every_key_of_the_error_sections() -> None:
     stated = {str(step) for document in DOCUMENTS.values() for key in error_keys(document) for step in key}
     sections = ("MotionError", "Vibration", "Imu", "GaussMarkov", "LeverArm", "Oscillator", "CommonMotionError")
     sections += ("TimingError", "Synchronization", "Propagation", "LegDelay", "OtherError", "Wideband", "Sinusoid")
+    sections += ("Navigation", "AidedImu", "AidedGnss")
     missing = {
         f"{section}.{key}" for section in sections for key in definitions[section]["properties"] if key not in stated
     }
-    assert missing == OTHER_FORMS | {"MotionError.registered"}  # a key for kinds of installed packages
+    parts = {"AidedImu.sensor", "AidedGnss.sensor"}  # whose figures are keys beside them
+    assert missing == OTHER_FORMS | parts | {"MotionError.registered"}  # a key for kinds of installed packages

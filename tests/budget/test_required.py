@@ -29,6 +29,12 @@ ZERO = {
     "vibration": {"vibration": {"wideband": {"rms": 0}}},
     "time_tag": {"time_tag": 0},
     "lever_arm": {"lever_arm": {"uncertainty": 0}},
+    "navigation": {
+        "navigation": {
+            "imu": dict.fromkeys(("accelerometer_bias", "gyro_bias", "velocity_random_walk", "angle_random_walk"), 0),
+            "gnss": {"position": "1 cm", "rate": "5 Hz"},
+        }
+    },
 }
 OTHERS = (
     "imu",
@@ -179,7 +185,7 @@ def test_a_platform_that_does_not_move_owes_its_position_only(receiver: dict) ->
         "oscillator": OSCILLATOR,
     }
     changes = {f"platforms__transmitter__{key}": value for key, value in of_transmitter.items()}
-    asked = [kind for kind in DECLARABLE if kind != "covariance"]
+    asked = [kind for kind in DECLARABLE if kind not in ("covariance", "navigation")]
     changes |= {"requirements__declare": asked, "timing_error": {"linear": 0}, **OF_MISSION_ZERO}
     found = missing(platforms__receiver=receiver, **changes)
     assert found == [Missing("receiver", "position", "platforms.receiver.motion_error.position")]

@@ -524,11 +524,28 @@ def test_fixes_are_multiples_of_the_interval() -> None:
     assert schedule.fixes() == pytest.approx([-2, -1.5, -1, 1, 1.5, 2])
 
 
-def test_weights_of_nodes_sum_to_one() -> None:
-    for is_smoothed in (True, False):
-        times, weights = FixSchedule(
-            half_s=30.0, before_s=60.0, after_s=0.0, rate_hz=20.0, is_smoothed=is_smoothed
-        ).nodes()
-        assert weights.sum() == pytest.approx(1.0)
-        assert weights @ times**2 == pytest.approx(30.0**2 / 3)
-        assert np.abs(times).max() < 30.0
+@pytest.mark.parametrize("rate_hz", [0.1, 1.0, 20.0])
+@pytest.mark.parametrize("outages", [[], [(-1.5, 0.5)]], ids=["no outage", "outage"])
+@pytest.mark.parametrize("is_smoothed", [True, False], ids=["smoothed", "filtered"])
+def test_nodes_keep_orders_apart(is_smoothed: bool, outages: list[tuple[float, float]], rate_hz: float) -> None:
+    """A constant error, and every other order, leaks into no other order up to 23."""
+    schedule = FixSchedule(
+        half_s=2.0, before_s=5.0, after_s=0.0, rate_hz=rate_hz, outages=outages, is_smoothed=is_smoothed
+    )
+    times, weights = schedule.nodes()
+    assert np.abs(times).max() < 2.0
+    orders = np.polynomial.legendre.legvander(times / 2.0, 23)
+    assert (orders.T * weights) @ orders == pytest.approx(np.diag(1 / (2 * np.arange(24) + 1)), abs=1e-3)
+
+
+@pytest.mark.parametrize("method", ["smoothed", "filtered"])
+def test_a_large_constant_error_does_not_spread(method: str) -> None:
+    """Errors of fixes that stay for hours move the image; what spreads is that of the inertial sensor alone."""
+    options = {"method": method}
+    text = text_of("C", 3, "STIM300", "WANDER", options).replace("rate: 5 Hz", "rate: 1 Hz")
+    small, large = (
+        error_of(parse_mission(text.replace("position: 1 cm", position).replace("30 s", "1e6 s")))
+        for position in ("position: 1 cm", "position: 1 m")
+    )
+    assert large.full.displacement > 5 * small.full.displacement
+    assert large.full.spread < 3 * small.full.spread

@@ -16,7 +16,10 @@ NEAR = "Did you mean 'near'?"
         ("radar.aperture_time", "'aperture_time' is a key of 'collection'"),
         ("requirements.n_pull", "'n_pull' is a key of 'autofocus'"),
         ("platforms.receiver.motion_error.speed", "'speed' is a key of 'platforms.receiver'"),
-        ("platforms.receiver.imu", "'imu' is a key of 'platforms.receiver.motion_error'"),
+        (
+            "platforms.receiver.imu",
+            "'imu' is a key of 'platforms.receiver.motion_error' and 'platforms.receiver.motion_error.navigation'",
+        ),
         ("platforms.transmitter.bandwidth", "'bandwidth' is a key of 'platforms.transmitter.oscillator'"),
         (
             "platforms.transmitter.motion_error.vibration.sinusoidal[0].speed",

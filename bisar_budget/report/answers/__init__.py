@@ -1,7 +1,8 @@
 """Write the answer (the result) of a command in a format; the module `NAME_answer` is for the command NAME.
 
-The module of an answer has three functions. Each takes a sequence of answers, with one answer for each mission. The
-answers of `passes`, `sweep` and `diff` are about a whole run, so their sequence has one entry.
+The module of an answer has three functions, each of which takes a sequence of answers. For most commands, the
+sequence has one answer for each mission. An answer of `passes`, `sweep` or `diff` is about a whole run, and is the
+only item of its sequence.
 
 - `content(answers)` returns the content of the JSON document, without its first keys `format` and `version`;
 - `records(answers)` returns the table of numbers for CSV, data frames and workbooks, in SI units and radians;
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class AnswerForm(NamedTuple):
-    """The answer of a command, and the formats for which its module has functions of its own."""
+    """The answer of a command. Its module has a separate function for each format in `own_formats`."""
 
     command: str
     own_formats: tuple[str, ...] = ()
@@ -81,7 +82,7 @@ def format_of_file(command: str, name: str) -> str | None:
 
 
 def module_of(command: str) -> "ModuleType":
-    """Return the module that describes the answer of a command. It is imported at its first use."""
+    """Return the module that writes the answer of a command. The module is imported at its first use."""
     return import_module(f"bisar_budget.report.answers.{ANSWERS[command].command}_answer")
 
 

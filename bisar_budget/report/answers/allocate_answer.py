@@ -215,7 +215,7 @@ def _way_out(sheet: SpecificationSheet) -> str:
 
 
 def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
-    """Yield remarks for the reader of a sheet: limits without a requirement, remarks on specifications, and notes."""
+    """Yield remarks for the reader of a sheet: limits not due to a requirement, specifications, and notes."""
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
             effect = row.id.partition(".")[2]
@@ -339,7 +339,7 @@ def _title(sheet: SpecificationSheet, spec: Specification) -> str:
 
 
 def _statement(spec: Specification) -> str:
-    """Write a specification as a sentence that names its key in the mission file; the file defines its meaning."""
+    """Write a specification as a sentence about its key, which has the same meaning as in the mission file."""
     return f"{spec.key}, as the mission file counts it, shall be at most {spec.text}."
 
 

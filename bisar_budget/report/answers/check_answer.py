@@ -38,7 +38,7 @@ def as_markdown(report: Report, style: Style) -> str:
 
 
 def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
-    """Return the drawings and images of the report by the names of their files."""
+    """Return the contents of the drawings and images of the report, by file name."""
     return markdown.pictures(document(report, style))
 
 

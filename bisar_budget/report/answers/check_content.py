@@ -1,4 +1,7 @@
-"""The content of JSON `bisar-budget/check/1`. Later versions may add keys, but never change or remove them."""
+"""The content of the JSON document `bisar-budget/check/1`.
+
+Later versions may add keys, but never change or remove them.
+"""
 
 import math
 from collections.abc import Sequence

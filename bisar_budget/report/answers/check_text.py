@@ -66,7 +66,7 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 
 
 def text_blocks(mission: MissionFindings | UnusableMission, style: Style) -> list[doc.Block]:
-    """Text about one mission, in at most 80 columns, or more if the file has long names."""
+    """Text about one mission. It is at most 80 columns wide, unless the file has long names."""
     if isinstance(mission, UnusableMission):
         return [_unusable(mission, style)]
     if style.verbosity < 0:
@@ -107,7 +107,7 @@ def _brief(mission: MissionFindings) -> doc.Block:
 
 
 def _opening(mission: MissionFindings) -> doc.Block:
-    """The verdict with mission name and document, model, rule of combination, overrides and warnings below it."""
+    """The verdict, and below it the mission name, document, model, rule of combination, overrides and warnings."""
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
     remarks = filter(None, (doubtful_model(mission), narrow_gradients(mission.geometry)))
@@ -147,7 +147,7 @@ def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
 
 
 def _evidence(mission: MissionFindings) -> Iterator[doc.Block]:
-    """Yield the results of Monte Carlo and of images, if there are any."""
+    """Yield the results of the Monte Carlo draws and of the simulated images, if there are any."""
     if mission.monte_carlo is not None:
         yield doc.Items([[line] for line in probabilities(mission.monte_carlo)])
     if mission.verdicts is not None:
@@ -157,7 +157,7 @@ def _evidence(mission: MissionFindings) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- rows
 def _rows(mission: MissionFindings, style: Style, room: int) -> doc.Block:
-    """The table of rows that are declared or limit something, worst first, and the numbers of hidden rows.
+    """The table of rows with a declared error or a checked limit, worst first, and the number of hidden rows.
 
     If the table has more than `room` lines, passing rows are hidden, beginning with the smallest utilization.
     """

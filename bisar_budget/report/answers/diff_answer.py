@@ -278,7 +278,7 @@ def _arrow(words: str) -> str:
 
 
 def _groups(changes: Iterable[_ChangeInWords]) -> Iterator[doc.Block]:
-    """Yield the changes in groups with the same label, each as a list below the title of the label."""
+    """Yield a group for each label: a list of the changes with this label, below a title."""
     changes = list(changes)
     for label, title in _TITLE_OF_LABEL.items():
         items: list[doc.Line] = [

@@ -311,7 +311,7 @@ def _figureless(overpass: SatellitePass) -> str:
 def _grouped(
     overpasses: Sequence[SatellitePass], text_of: Callable[[SatellitePass], str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield each distinct text that `text_of` returns for the passes, with the numbers of these passes."""
+    """Yield each distinct text that `text_of` returns for passes, and the numbers of the passes with this text."""
     groups: dict[str, list[int]] = {}
     for overpass in overpasses:
         if text := text_of(overpass):
@@ -340,7 +340,7 @@ _MAX_LINE_BYTES = 75  # without the end of the line
 
 
 def as_ics(answers: Sequence[Passes], style: Style) -> str:
-    """Write a calendar (RFC 5545) with an event for each pass. Its creation date is the day of the check in UTC.
+    """Write a calendar (RFC 5545) with an event for each pass. The events are dated with the day of the check (UTC).
 
     Lines end with LF, which must be converted to CR LF in the file. If the culmination with newer orbital elements is
     still within the same half hour, the event keeps its UID.

@@ -93,10 +93,10 @@ def _relaxed(relaxed: Relaxed) -> dict[str, object]:
 
 # ---------------------------------------------------------------- for people
 def document(answers: Sequence[Sensitivity], style: Style) -> doc.AnswerDocument:
-    """Text of each answer: a table of numbers, a drawing of their effects, and the effect of doubling errors.
+    """Text of each answer: a table of the numbers in the mission file, and a drawing of their effects.
 
-    The numbers are the numerical values in the mission file. If the shares of the platforms are balanced, doubling an
-    error also affects the utilization of the other errors.
+    If the shares of the platforms are balanced, the text also states the effect of doubling errors, because an error
+    then affects the utilization of the other errors too.
     """
     chapters = [mission_chapter(answer, number, _blocks(answer, number)) for number, answer in enumerate(answers, 1)]
     return mission_document("Sensitivity", answers, chapters)

@@ -352,7 +352,7 @@ def _undecided(requirement: str | None) -> str:
 
 
 def _state_words(state: State) -> str:
-    """Text about the mission at one value of the key: its status, and the deciding row with its utilization."""
+    """Text about the mission at one value of the varied key: status, and deciding row with its utilization."""
     word = STATUS[state.status].text
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:

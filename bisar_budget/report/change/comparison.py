@@ -1,6 +1,6 @@
-"""Compare missions before and after a change: inputs, loosened rules, loss of margins, and a gate.
+"""Compare missions before and after a change: inputs, rules that became looser, and lost margins.
 
-The gate refuses changes that use up too much of a margin or loosen a rule.
+A gate refuses changes that use up too much of a margin or loosen a rule.
 """
 
 import math
@@ -212,7 +212,8 @@ def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
 def _owned(word: str) -> list[str]:
     """Kinds of error, such as `receiver.position`, that an entry of `requirements.declare` requires to be declared.
 
-    An entry without a platform stands for this kind of error on both platforms, if it belongs to a platform.
+    If the entry does not name a platform, but its kind of error belongs to a platform, the entry applies to both
+    platforms.
     """
     return [word] if "." in word or word in OF_MISSION else [f"{name}.{word}" for name in PLATFORMS]
 
@@ -220,8 +221,8 @@ def _owned(word: str) -> list[str]:
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
     """Yield the rules that became looser.
 
-    The rules are `n_pull` of the autofocus, the coverage factor, the warning threshold, the shares of the budget, the
-    gating model (which decides the verdicts), and the rule that combines errors.
+    The rules are the pull-in range `n_pull` of the autofocus, the coverage factor, the warning threshold, the shares
+    of the budget, the gating model (which decides the verdicts), and the rule that combines errors.
     """
     missions = (before.analysed().mission, after.analysed().mission)
     for section, key, sign in _LIMITING_NUMBERS:
@@ -347,7 +348,7 @@ def _error(row: Row) -> str:
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
     """Yield the kinds of error whose source was stated before the change, but is no longer stated after it.
 
-    Errors with individual names are listed one by one.
+    Errors that have names of their own in the file are listed one by one.
     """
     had_source = set(before.kinds.declared) - set(before.kinds.without_source)
     lost = [
@@ -362,7 +363,7 @@ def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosen
 
 
 def _named_sources(mission: Mission) -> dict[str, str | None]:
-    """Sources of the named errors, by the ids of their rows."""
+    """Map the row ids of errors with names of their own to the sources of the errors; None if there is no source."""
     sources = {row_id: one.source for one in mission.other_errors for row_id in one.stated}
     for platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
@@ -618,7 +619,7 @@ def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[R
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:
-    """Whether a status became worse and breaks a requirement: fail, or not evaluated after any status except fail."""
+    """Whether a status became fail, or became not evaluated and was not fail before."""
     return after in BROKEN and (before is None or RANK[after] < RANK[before])
 
 

@@ -67,9 +67,10 @@ class FallenEffect:
 
 
 class NotComparable(NamedTuple):
-    """A changed error that is invalid with the earlier geometry and waveform, given by its key and the reason.
+    """A changed error that is invalid with the earlier geometry and waveform.
 
-    Such an error prevents the comparison of effects.
+    Such an error prevents the comparison of effects. `id` is the key of the error, and `problem` the reason why it is
+    invalid.
     """
 
     id: str
@@ -141,7 +142,7 @@ def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platf
 
 
 def _misfits(mission: Mission) -> dict[KeyPath, str]:
-    """Map the key of each error that is invalid with the geometry and waveform of the mission to the reason."""
+    """Reasons why errors are invalid with the geometry and waveform of the mission, by the keys of the errors."""
     problems = [(problem.at, problem.problem) for problem in Mission.problems(mission._asdict())]
     for name, platform in mission.platforms._asdict().items():
         problems += [

@@ -101,7 +101,7 @@ def _chosen(platform: Platform) -> list[str]:
 
 
 def _key(platform: Platform) -> str:
-    """Key that states the path of a platform within its section: kind and format, such as `orbit.tle`."""
+    """Key, within the section of a platform, that states its path: kind and format, such as `orbit.tle`."""
     stated = getattr(platform, platform.way)
     form = next(key for key in stated._fields if key not in _NOT_OF_FORM and getattr(stated, key) is not None)
     return f"{platform.way}.{form}"

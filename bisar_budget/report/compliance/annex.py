@@ -75,7 +75,7 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
 
 # ---------------------------------------------------------------------- specifications
 def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    """Yield the specification sheet of a mission, and the number of declared errors above their specification."""
+    """Yield the specification sheet of a mission, and the number of errors declared larger than specified."""
     outside = sum(spec.declared is not None and not spec.holds(spec.declared) for spec in sheet.specifications)
     silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
     clauses = list[str]()
@@ -137,7 +137,7 @@ def _question(trade: Trade) -> str:
 
 
 def _values(axis: Axis) -> str:
-    """Describe the values of a sweep axis: the words, or the number of values with the first and the last value."""
+    """Describe the values of a sweep axis: a list of words, or the count and the first and last number."""
     count = len(axis.values)
     if axis.words:
         word_list = ", ".join(map(printable, axis.words[:_MAX_LISTED_WORDS]))
@@ -229,7 +229,7 @@ def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple
 
 # ---------------------------------------------------------------------- images
 def _evidence(page: Page) -> Iterator[doc.Block]:
-    """Yield the blocks of the chapter that compares predictions with measurements in images at the limits."""
+    """Yield the blocks that compare predictions with measurements in images, each with an error at its limit."""
     verdicts = page.findings.verdicts or ()
     yield doc.Paragraph(
         "Each error was set to its limit in data simulated from exact ranges, and the phase was measured in the "

@@ -74,9 +74,9 @@ def _use(requirement: JudgedRequirement) -> float | None:
 
 
 def _margins(entries: Sequence[OverviewEntry], keys: Sequence[str]) -> Iterator[doc.Line]:
-    """Yield a line for each requirement with the largest utilization, and with its mission and row.
+    """Yield a line for each requirement: its largest utilization, and the mission and row with this utilization.
 
-    Lines of requirements that some missions cannot judge follow, with these missions.
+    Further lines name the requirements that could not be judged for some missions, and list these missions.
     """
     for key in keys:
         judged = [

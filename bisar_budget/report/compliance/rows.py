@@ -250,8 +250,8 @@ def method(row: Row, verdict: str | None) -> str:
 class Contribution:
     """Effect of one declared error on the phase or the position of the image.
 
-    `fraction` is its size relative to the largest effect. `model_cells` are additional table cells for a phase: its
-    share of the sum, and its values by the published and the full model.
+    `fraction` is the ratio of this effect to the largest effect. `model_cells` are additional table cells for a
+    phase: its share of the sum, and its values according to the published and the full model.
     """
 
     id: str
@@ -280,11 +280,11 @@ class Contribution:
 def phase_contributions(page: Page) -> list[Contribution]:
     """List the quadratic phase that each declared error causes by itself, largest first.
 
-    The phase includes the hidden phase, which the bandwidth and the turn of the line of sight do not resolve: it is
-    the quadratic phase that would cause the same peak loss as the quadratic and the hidden phase together. Each
-    contribution has its share of the sum of all phases, and its values by the published and the full model. An error
-    that is too large to form an image has an infinite phase, and comes first. The sum is then infinite, and no
-    contribution has a share.
+    The listed phase would cause the same peak loss as the quadratic phase of the error and its hidden phase together.
+    The hidden phase is due mainly to constant and linear range errors that the bandwidth and the turn of the line of
+    sight do not resolve. Each contribution has its share of the sum of all phases, and its values according to the
+    published and the full model. An error that is too large to form an image has an infinite phase, and comes first.
+    The sum is then infinite, and no contribution has a share.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
@@ -392,7 +392,7 @@ def all_contributions(page: Page) -> Iterator[doc.Block]:
 
 
 def verification_words(findings: MissionFindings, requirement: JudgedRequirement) -> str:
-    """Text on how this run verified a requirement: by analysis, by images at limits, or by Monte Carlo draws."""
+    """Text on how a run verified a requirement: by analysis, images with errors at limits, or Monte Carlo draws."""
     if requirement.is_unjudged:
         return "none"
     methods = ["analysis"]
@@ -408,9 +408,10 @@ def verification_words(findings: MissionFindings, requirement: JudgedRequirement
 
 
 class Declaration(NamedTuple):
-    """Kinds of error with the same source, declared for the same platform, for the clock or for the mission.
+    """Declared kinds of error that have the same source and the same owner.
 
-    `source` is None if the file does not name a source. `owes_source` states whether a source is required.
+    `owner` is a platform, both platforms, the clock or the mission. `source` is None if the file does not name a
+    source. `owes_source` states whether a source is required.
     """
 
     owner: str

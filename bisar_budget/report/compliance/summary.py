@@ -209,7 +209,7 @@ def _provenance(report: Report) -> doc.Chapter:
 
 
 def _approval(report: Report) -> doc.Chapter:
-    """Return the chapter for signatures, and a table of the data-sheet spectra that a mission file shifts."""
+    """Return the chapter for signatures. It also lists the data-sheet spectra whose level a mission file shifts."""
     blocks: list[doc.Block] = []
     shifted = [
         (findings.name, doc.Styled("id", doc.Name(error.key)), error.level, error.off)

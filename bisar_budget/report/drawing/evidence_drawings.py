@@ -1,4 +1,4 @@
-"""Images at a limit as evidence: cross-range cuts as SVG, chips (small images) as PNG, and their captions."""
+"""Draw images with an error at its limit: cross-range cuts as SVG, chips (small images) as PNG, and captions."""
 
 import struct
 import zlib
@@ -24,7 +24,7 @@ class Curve(NamedTuple):
 
 
 def impulse_response_cuts(evidence: ImageEvidence) -> str:
-    """Draw the cross-range cuts for an error at its limit as SVG, together with the cut without the error.
+    """Draw cross-range cuts as SVG: with an error at its limit, and without the error.
 
     Cuts after autofocus are in a second panel.
     """
@@ -60,7 +60,7 @@ def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Cur
 
 
 def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
-    """Yield sentences with the predicted and the measured values at a limit, also with autofocus."""
+    """Yield sentences with the predicted and the measured values at a limit, and the values after autofocus."""
     verdict = evidence.verdict
     yield f"{_at_limit(verdict)}."
     measures = (

@@ -3,7 +3,7 @@
 The panels are Figures 3 to 7 of Rigling & Moses, drawn for any mission. Titles and legends are written for readers
 who do not know the paper. With an option, they have the numbers of the paper's figures and equations instead. All
 coordinates are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of equation
-(10), rotated about the same centre. A response is at its displaced position, not at the middle of a patch.
+(10), rotated about the same centre. A response is drawn at its displaced position, not in the middle of its patch.
 """
 
 import math
@@ -60,7 +60,7 @@ Limits = tuple[float, float, float, float]
 
 
 class _PanelText(NamedTuple):
-    """A title or legend entry in two versions: `plain` for readers without the paper, `paper` with its numbers."""
+    """A title or legend entry: `plain` for readers without the paper, `paper` with the numbers used in the paper."""
 
     plain: str
     paper: str
@@ -99,8 +99,8 @@ class ImagePanel(NamedTuple):
     `level_db` (nx, ny) has x or x′ along its first axis, and NaN for pixels without an image. `corners` (nx + 1, ny +
     1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets, and `shown_places` (n,
     2) their image points by equation (25) of Rigling & Moses. `image_points` (n, 2) are the peaks of the targets in
-    the image; it is empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of each target by
-    equation (29), for each third of the aperture. All coordinates are in metres along `axes`.
+    the image; the array is empty if the peaks agree with (25). `points` (n, 3, 2) are the image points of each target
+    by equation (29), for each third of the aperture. All coordinates are in metres along `axes`.
     """
 
     title: str
@@ -643,7 +643,7 @@ def _cuts_drawing(drawn: Sheet, size: tuple[float, float]) -> str:
 
 
 def _within(curve: Curve, low: float, high: float) -> Curve:
-    """Part of a cut between two positions. [m]"""
+    """Part of a cut between the positions `low` and `high` [m]."""
     pairs = zip(curve.positions, curve.levels_db, strict=True)
     visible = [(position, level) for position, level in pairs if low <= position <= high]
     return curve._replace(positions=[position for position, _ in visible], levels_db=[level for _, level in visible])

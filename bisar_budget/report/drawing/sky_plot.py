@@ -84,7 +84,7 @@ def _style(statuses: Sequence[str], width: float) -> str:
 def _at(middle: svg.Point, azimuth: float, elevation: float) -> svg.Point:
     """Point on the page for a direction in the sky.
 
-    The direction is given by azimuth (from east, counter-clockwise) and elevation. [rad]
+    The direction is given by azimuth [rad], counter-clockwise from east, and elevation [rad].
     """
     radius, angle = _HORIZON_PX * (1 - 2 * elevation / math.pi), bearing(azimuth)
     return middle[0] + radius * math.sin(angle), middle[1] - radius * math.cos(angle)
@@ -144,7 +144,8 @@ def _numbers(
 ) -> None:
     """Write the number of each pass beside its mark.
 
-    If there are very many passes, only complying passes are numbered, and only if they are few.
+    If there are very many passes, only the complying passes are numbered. If there are also very many complying
+    passes, no numbers are written.
     """
     numbered_marks = list(zip(overpasses, marks, strict=True))
     if len(numbered_marks) > _MAX_NUMBERED_COUNT:

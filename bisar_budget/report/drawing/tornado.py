@@ -88,7 +88,7 @@ def _label(slope: Slope) -> str:
 
 
 def _even(slope: Slope) -> str:
-    """Text with the change of a number whose effect a bar shows: its size and its unit."""
+    """Text with the size and unit of the change to which a bar refers, such as `1 %`."""
     if slope.measure == COMPARED_CHANGE_FRACTION:
         return slope.per_text
     size, _, unit = slope.per_text.partition(" ")

@@ -140,7 +140,7 @@ def _is_log(values: Floats) -> bool:
 
 
 def per_word(trade: Trade) -> tuple[Axis, Mapping[str, Trade]] | None:
-    """Split a sweep over a number and a few words into one sweep over the number for each word.
+    """Split a sweep over a numerical key and a key with a few words into a numerical sweep for each word.
 
     Returns the axis of the words and the sweeps by word; None for any other sweep.
     """
@@ -164,9 +164,10 @@ def rows_that_matter(trade: Trade) -> tuple[str, ...]:
 
 
 def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) -> Mapping[str, Floats]:
-    """Utilizations of the rows from `rows_that_matter` in a sweep over one key, (cases,) each; else an empty mapping.
+    """Utilizations of the rows from `rows_that_matter` in a sweep over one key, each (cases,), by row id.
 
-    `gathered` runs the sweep again and collects the columns with the given names.
+    The mapping is empty for any other sweep. `gathered` runs the sweep again and collects the columns with the given
+    names.
     """
     if len(trade.axes) != 1 or trade.column or not (rows := rows_that_matter(trade)):
         return {}

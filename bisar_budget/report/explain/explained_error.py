@@ -112,7 +112,7 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
 
 
 def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
-    """Coefficient β̃ₙ of the range error of one unit, where n is `order`. [m/sⁿ per unit]
+    """Coefficient β̃ₙ of the range error that one unit of an error causes, with n = `order`. [m/sⁿ per unit]
 
     β̃₂ and β̃₃ are computed from the phases at the aperture edge, which are (2π/λ)·β̃ₙ·(T/2)ⁿ.
     """
@@ -244,7 +244,7 @@ def _common_effect(
 def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps for a time-tag error.
 
-    They show the position and velocity errors that it causes, and its phase by the published model.
+    They show the position and velocity errors that it causes, and its phase according to the published model.
     """
     size = abs(size)
     for name in (PLATFORMS[index] for index in source.platforms):
@@ -275,7 +275,7 @@ def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each:
 def _registered_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps for an error of a registered kind, which is defined by an installed package.
 
-    They show the description of the kind, and the phase of the error by the published model.
+    They show the description of the kind, and the phase of the error according to the published model.
     """
     yield step(f"{source.kind.name}, a registered kind of error ({source.equation}): {source.kind.description}")
     unit = f"rad per {source.unit}"
@@ -311,8 +311,8 @@ def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
 def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
     """Quadratic phase per unit of an error along any axis, as a sum over the axes of the scene.
 
-    The phase for each scene axis is multiplied by the component of the error's axis along it. The sum is returned as
-    text and as a number [rad/unit].
+    The phase due to an error along a scene axis is multiplied by the cosine of the angle between this axis and the
+    axis of the error. The sum is returned as text and as a number [rad/unit].
     """
     _, _, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(analysis.geometry, platform)
@@ -347,7 +347,7 @@ def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: floa
 def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Yield the explanation steps for an error along an axis of a frame other than the scene.
 
-    Its effect is the sum of the effects along the axes of the scene, projected on this axis.
+    The effects of errors along the scene axes are projected on this axis and added.
     """
     terms, _ = _projected(analysis, source, source.owner)
     unit = f"rad per {source.unit}"
@@ -487,10 +487,10 @@ class Residual:
 
     @property
     def hidden(self) -> float:
-        """Hidden phase: the quadratic phase that would cause the same peak loss as some residual phases. [rad]
+        """Hidden phase: the quadratic phase that would cause the same peak loss as several residual phases. [rad]
 
-        These residual phases are the phase that changes over the band, and the linear phase over the aperture. If
-        `is_turned`, the cubic phase and the phases of higher orders are included.
+        The residual phases are the phase that changes over the band, and the linear phase over the aperture. If
+        `is_turned`, they also include the cubic phase and the phases of higher orders.
         """
         square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE_ORDER] ** 2 / 3
         if self.is_turned:
@@ -508,7 +508,7 @@ class Residual:
         return math.hypot(self.phase(_QUADRATIC_ORDER), self.gain * self.hidden)
 
     def sum(self, symbol: str, order: int) -> Sum:
-        """Text that computes the phase of a polynomial order as a weighted sum of the range errors at the nodes."""
+        """Equation for the phase of a polynomial order: a weighted sum of the range errors at the nodes, as text."""
         terms = self._terms(order)
         return Sum(
             f"{symbol} = 2*π/{number(self.radar.wavelength)}*({terms}) = {with_unit(self.phase(order), 'rad')}"
@@ -625,7 +625,7 @@ def worse_sign(
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the explanation steps that derive the phases of an error by the full model from its signed size.
+    """Yield the explanation steps that derive the phases of an error from its signed size with the full model.
 
     `size` is in the unit of the error. If the error is not declared, `size` is one unit. The text `each` then states
     this; it is inserted into the titles of the steps.
@@ -697,7 +697,7 @@ def _residual_formula(exact: ExactRanges) -> str:
 
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """Yield the explanation step that shows the quadratic phase by the full model for comparison.
+    """Yield the explanation step that shows the quadratic phase according to the full model, for comparison.
 
     The status is decided by the published model.
     """

@@ -1,4 +1,8 @@
-"""Explanation steps of an aided navigation: its figures, its errors at mid-aperture, and what its effect rests on."""
+"""Explanation steps of an aided navigation: its parameters, its errors, and the sensitivity of its effects.
+
+The errors are shown at mid-aperture. The sensitivity is the change of the effects with each parameter and with the
+aperture time.
+"""
 
 import math
 from collections.abc import Iterator
@@ -45,7 +49,7 @@ _EFFECTS_BY_REQUIREMENT = {
 def navigation_steps(analysis: Analysis, error: RandomError, binding: str | None) -> Iterator[Step]:
     """Yield the explanation steps of an aided navigation.
 
-    `binding` is the requirement that limits its row; None if no requirement does.
+    `binding` is the requirement that limits the row of the navigation; None if no requirement limits this row.
     """
     mission = analysis.mission
     navigation: Navigation = getattr(mission.platforms, error.owner).motion_error.navigation
@@ -71,7 +75,7 @@ def navigation_steps(analysis: Analysis, error: RandomError, binding: str | None
 
 
 def _figures(navigation: Navigation) -> Iterator[str]:
-    """Lines of text with the figures of an aided navigation."""
+    """Yield a line of text for each parameter of an aided navigation, such as the gyro bias or the fix rate."""
     for key, value in navigation.figures.items():
         unit = _FIGURE_UNITS[key.rpartition(".")[2]]
         sizes = dict.fromkeys(with_unit(float(size), unit) for size in value)
@@ -82,7 +86,7 @@ def _figures(navigation: Navigation) -> Iterator[str]:
 
 
 def _method(mission: Mission, navigation: Navigation) -> str:
-    """Sentence about the method, and the fixes that it uses."""
+    """Text about the method, smoothing or filtering, and about the time span of the fixes that it uses."""
     half = mission.collection.aperture_time / 2
     start, end = (
         format_quantity(-half - navigation.before, "s", 4),
@@ -96,7 +100,8 @@ def _method(mission: Mission, navigation: Navigation) -> str:
 def _correlation(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     """Yield the step with the correlation of tilt and accelerometer bias at mid-aperture.
 
-    Both accelerate the navigation along the line of sight. The fixes observe only their sum.
+    Both errors cause an apparent acceleration along the line of sight. The fixes observe only the sum of the two
+    accelerations.
     """
     mission = analysis.mission
     assert error.navigation is not None
@@ -129,7 +134,7 @@ def _correlation(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _derivatives(mission: Mission, navigation: Navigation, error: RandomError, binding: str) -> Iterator[Step]:
-    """Yield the step that says which figure matters most to the requirement that limits the row."""
+    """Yield the step with the change of the limited effect per percent of change in each parameter, largest first."""
     words, effect_name = _EFFECTS_BY_REQUIREMENT.get(binding, _EFFECTS_BY_REQUIREMENT[QUADRATIC])
     figures, varied = list(navigation.figures), mission
     for row, figure in enumerate(figures, 1):
@@ -152,7 +157,7 @@ def _derivatives(mission: Mission, navigation: Navigation, error: RandomError, b
 def _growth(mission: Mission, error: RandomError) -> Iterator[Step]:
     """Yield the step that shows how the effects grow with the aperture time.
 
-    There is no step for a path from a file, which ends with the aperture.
+    There is no step if a platform path was read from a file, because such a path ends with the aperture.
     """
     if any(path.curve is not None for path in mission.geometry.both):
         return
@@ -169,7 +174,7 @@ def _growth(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _effects(mission: Mission, name: str, cases: int) -> RandomEffect:
-    """Effects of a platform's aided navigation in each case by the full model, with the coverage factor 1."""
+    """Effects of a platform's aided navigation in each case, according to the full model, for coverage factor 1."""
     mission = mission._replace(allocation=mission.allocation._replace(coverage_factor=1.0))
     (error,) = aided_navigation(SensorCases(mission, mission.geometry, cases), name)
     return error.full

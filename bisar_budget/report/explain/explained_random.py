@@ -1,4 +1,4 @@
-"""Explanation steps for random errors: the phases of inertial sensors, clocks, atmospheric delays and vibrations."""
+"""Explanation steps for random errors: phases due to inertial sensors, clocks, atmospheric delays and vibrations."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -121,7 +121,7 @@ def _inertial(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _without_lever(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """Yield the explanation steps for an error of an inertial sensor by the published model, without a lever arm.
+    """Yield the explanation steps of the published model for an error of an inertial sensor without a lever arm.
 
     This model assumes that the line of sight does not change during the aperture.
     """
@@ -337,9 +337,8 @@ def _gauss_markov(
 ) -> Iterator[Step]:
     """Yield the explanation steps for a Gauss-Markov process: its mean squares, and its quadratic phase per unit.
 
-    The phase is computed by the published model. `along` is the symbol of the component along the line of sight. For
-    a delay, it is the symbol of the component along the signal path through the air. `title` is the title of the last
-    step.
+    The phase is computed with the published model. `along` is the symbol of the component along the line of sight,
+    or, for a delay, of the component along the signal path through the air. `title` is the title of the last step.
     """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(

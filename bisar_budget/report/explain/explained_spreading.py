@@ -190,7 +190,7 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 
 
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
-    """Yield the explanation step that computes the utilization of a row in decibels, as a ratio of amplitudes.
+    """Yield the explanation step for the utilization of a row with values in dB, which is a ratio of amplitudes.
 
     Nothing is yielded for a row without a utilization.
     """
@@ -244,7 +244,8 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for a spur of an oscillator.
 
-    They show the level of the paired echoes of the spur, and the level allowed by the share of the requirement.
+    They show the level of the paired echoes of the spur, and the level that the platform's share of the requirement
+    allows.
     """
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = OSCILLATOR_KIND.path(row.owner, row.subject.axis)

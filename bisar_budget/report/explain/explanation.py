@@ -270,7 +270,7 @@ def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: R
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """Yield the explanation steps for a vibration: its line in the mission file, and its limits by both models.
+    """Yield the explanation steps for a vibration: its line in the mission file, and its limits in both models.
 
     The vibration is a single spectral line, the sum of several neighbouring lines, or noise.
     """
@@ -468,7 +468,7 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
     """Yield the explanation step that adds the paired echoes of neighbouring spectral lines.
 
-    They are added at the place where their sum is highest.
+    The echoes are added at the distance from the peak at which their sum is highest.
     """
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
@@ -536,10 +536,10 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
 
 
 def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
-    """Yield the explanation steps for the combined quadratic phase of all errors that belong to one platform.
+    """Yield the explanation steps for the combined quadratic phase of all errors of one owner.
 
-    For some rows, they are the errors of the clock or of the mission instead. Further steps explain the limit on this
-    phase.
+    The owner is a platform, the clock or the mission; all errors belong to the mission. Further steps explain the
+    limit on this phase.
     """
     together, owner, allocation = analysis.together(_model(row)), row.owner, findings.allocation
     members = together.owed(allocation.qpe, owner)
@@ -580,7 +580,7 @@ def _cubic_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) ->
 def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
     """Yield the explanation steps for the quadratic phase over the band that is caused by ionospheric dispersion.
 
-    It is shown for the signal path of each platform and for both paths together.
+    The phase is shown for the signal path of each platform, and for both paths together.
     """
     mission = analysis.mission
     legs = dispersed_legs(mission, mission.geometry)

@@ -462,8 +462,7 @@ def catalogued(formula: str, language: Language) -> str:
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
     """Replace the symbols in a MathML formula by their values.
 
-    Negative values get brackets. So does a value that is written with a power of ten, if the formula raises it to a
-    power.
+    Brackets are put around negative values, and around values with a power of ten that the formula raises to a power.
     """
 
     def filled_match(match: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""Write requirements and rows as CSV for a spreadsheet: a header, and a line for each of them, in SI units.
+"""Write requirements and rows as CSV for a spreadsheet, in SI units: a header, and a line for each item.
 
 The column `kind` states whether a line is a requirement or a row. The line of a requirement has an id such as
 `requirement.islr`. Its column `declared` has the reached value, `allowable` the required value, and `decided_by` the

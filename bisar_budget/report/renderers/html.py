@@ -54,7 +54,7 @@ def page(document: doc.AnswerDocument) -> str:
 
 
 def _contents(chapters: Sequence[doc.Chapter]) -> list[tuple[doc.Chapter, list[doc.Chapter]]]:
-    """List the chapters for the contents, each with the chapters inside it; empty for a single entry."""
+    """List the chapters for the table of contents, each with its subchapters; empty if there is only one entry."""
     listed = [chapter for chapter in chapters if chapter.is_listed]
     inner = [
         [block for block in chapter.blocks if isinstance(block, doc.Chapter) and block.is_listed]

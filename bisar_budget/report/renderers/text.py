@@ -143,9 +143,10 @@ def _table(table: doc.TextTable, style: Style) -> Iterator[str]:
     starts_with_status = any(isinstance(row[0], doc.Badge) for row in table.rows)
     widths[0] = max(widths[0], _STATUS_WIDTH) if starts_with_status else widths[0]
     named = 1 if starts_with_status else 0  # the column with the names of the rows
-    fixed_width = sum(widths) - widths[named] + len(widths) - 1
-    room = max(style.table_width - fixed_width, *(len(head[named]) for head in heads))
-    widths[named] = max(len(row[named]) for row in (*heads, *cells) if len(row[named]) <= room)
+    if sides[named] == "<":  # numbers stay on their line
+        fixed_width = sum(widths) - widths[named] + len(widths) - 1
+        room = max(style.table_width - fixed_width, *(len(head[named]) for head in heads))
+        widths[named] = max(len(row[named]) for row in (*heads, *cells) if len(row[named]) <= room)
     for head in heads:
         yield spaced(head, widths, sides).rstrip()
     below = table.below or [()] * len(cells)

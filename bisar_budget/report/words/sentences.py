@@ -24,7 +24,7 @@ BINDING_WORDS = {
 def matters(row: Row) -> bool:
     """Whether a row is worth showing: its error is declared, or it has a limit that is checked.
 
-    A passing row is not worth showing if its axes differ from the axes used in the mission file.
+    A passing row is nevertheless left out if its axes differ from the axes used in the mission file.
     """
     if row.status in ("info", "pass"):
         is_declared = (
@@ -37,7 +37,7 @@ def matters(row: Row) -> bool:
 def binding_words(row: Row) -> str:
     """Name of the requirement that sets the allowable of a row.
 
-    The name is empty if this requirement limits the metric of the row itself.
+    The name is empty if the metric of the row is the quantity that this requirement limits.
     """
     return "" if row.binding_requirement == row.metric else BINDING_WORDS.get(row.binding_requirement or "", "")
 
@@ -78,7 +78,10 @@ def use_words(use: float | None) -> str:
 
 
 def own_id(judged: Row | JudgedRequirement) -> str:
-    """Requirement ids of a row or a requirement, in brackets and with a leading space; empty if there are no ids."""
+    """Ids of the project requirements to which a row, or a requirement of the mission, refers.
+
+    They are written in brackets and with a leading space. The text is empty if there are no ids.
+    """
     return f" [{judged.requirement_id}]" if judged.requirement_ids else ""
 
 
@@ -188,7 +191,7 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row. It is rounded down, so that the row passes if the text is copied into a file.
+    """Write the allowable of a row, rounded down so that the row passes if the written value is copied into a file.
 
     Image levels (rows of PSLR and ISLR) are rounded to nearest, because they are never copied into a file.
     """
@@ -210,7 +213,7 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 def shown_use(row: Row) -> float | None:
     """Utilization of a row for display.
 
-    None if the row has no limit, or if it cannot be judged; a waiver does not change this.
+    It is None if the row has no limit or cannot be judged. A waived row keeps its utilization.
     """
     return None if row.allowable is None or row.is_unjudged else row.utilization
 
