@@ -333,7 +333,8 @@ class ScenePhases:
     ) -> None:
         """Replace first-order phase differences by exact differences, for given pairs of error and place.
 
-        `kept` holds the phase differences and the smallest area ratios of `around`, and both are updated in place.
+        `kept` holds the two arrays to update in place: the phase differences, (errors and parts, places), and the
+        smallest area ratios, (places,). The method `around` creates these arrays and explains them.
         `error` and `point` hold the indices of the error and of the place of each pair.
         """
         (differences, turns), case, count = kept, of[point], error.size

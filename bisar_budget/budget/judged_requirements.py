@@ -1,4 +1,4 @@
-"""Judgement of each requirement from its rows, from effects that no requirement covers, and from the declared errors.
+"""Judgement of the requirements of a mission, from the rows of its budget and the effects of its declared errors.
 
 The exit code 0 of a check means that every requirement was judged and is met. Each effect of each declared error is
 judged against one requirement:
@@ -10,7 +10,7 @@ judged against one requirement:
 - displacement of the image: against the location requirement.
 
 An effect that no requirement covers is negligible if its total is below 0.08 rad and below a tenth of the limit on
-the quadratic phase. Otherwise the rows that cause the effect are `not_evaluated`.
+the quadratic phase. Otherwise the rows of the errors that cause the effect are `not_evaluated`.
 
 All numbers are arrays over n cases, (n,). The check of one mission is a single case.
 """

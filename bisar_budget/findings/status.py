@@ -100,7 +100,10 @@ STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 
 
 def worst(statuses: Iterable[str]) -> str:
-    """Return the worst of the statuses that a mission can have; `pass` if `statuses` has no such status."""
+    """Return the worst status in `statuses`; statuses that a mission cannot have are ignored.
+
+    The result is `pass` if `statuses` contains no status that a mission can have.
+    """
     return min((name for name in statuses if STATUS[name].gates), key=RANK.__getitem__, default="pass")
 
 

@@ -537,7 +537,8 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
 def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
     """Rotate a covariance (6, 6) from a motion-error frame to the scene axes.
 
-    The result refers to Earth-fixed velocities.
+    The velocity errors in the result are errors of the velocity relative to the rotating Earth, not of the inertial
+    velocity.
     """
     axes = np.array(state.frame(frame), dtype=float)
     if frame == "ric" and state.fall is not None:

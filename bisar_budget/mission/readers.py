@@ -634,9 +634,9 @@ class SizeMap(Reader[dict[str, object]]):
 
 
 class RegisteredSizes(Reader[dict[str, float]]):
-    """Sizes of errors whose kinds packages register (`error_kinds.register`), by the name of the kind.
+    """Reader of the sizes of errors of registered kinds, as a dictionary from the name of a kind to a number in SI.
 
-    The class reads these sizes as a dictionary of numbers in SI.
+    Packages register kinds of errors with `error_kinds.register`.
     """
 
     def read(self, value: object, path: KeyPath, report: Report) -> dict[str, float] | Invalid:

@@ -312,7 +312,7 @@ class PointPaths:
     def _predicted_from_last(
         self, index: Indices, lane: Indices, last: Floats, size: Floats
     ) -> tuple[Floats, Floats]:
-        """Predict the image points from the slopes of the path at the last two known points, east and north. [m]
+        """Predict east and north [m] of the image points from the slopes of each path at its last two known points.
 
         The slope is assumed to be a linear function of the error size. Near a fold it is assumed to be a linear
         function of the square root of the distance to the fold.

@@ -49,8 +49,8 @@ class PhaseGradientSettings:
         Lower bound of the clutter power of a line, relative to the peak power of the image. Lower values are caused
         by rounding, not by clutter.
     smear_fraction : float
-        Power at which the mean response is considered to end, as a fraction of its peak power. Both powers are
-        measured from the median.
+        Power at which the mean response is considered to end, as a fraction of its peak power. The median of
+        the mean response is first subtracted from both powers.
     shrink_factor : float
         Smallest ratio of the window width of an iteration to the window width of the previous iteration.
     narrowest_cells : int
@@ -58,7 +58,7 @@ class PhaseGradientSettings:
     bridge_cells : int
         Largest gap in the mean response that is bridged next to the peak [cells]. Farther from the peak, wider gaps
         are bridged: half the distance from the peak is added to this limit. Nulls within a smeared response are
-        narrower.
+        narrower than this limit and are therefore bridged; a wider gap separates targets.
     coherent_rad : float
         Rms phase error below which responses can be added coherently over the full aperture. [rad]
     significant_sigma : float

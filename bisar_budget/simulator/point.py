@@ -638,8 +638,8 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
     1, which is its power integrated over the ground; `level_db` is therefore the mean power of a pixel. Both results
     are empty if `level_db` is None. A range cell has `finer` times as many pixels as a cross-range cell. If `finer`
     is above 1, scatterers up to a range cell beyond the patch are included, because their responses extend into it.
-    These scatterers are out of focus; with each line of distance from the patch, their blur in cross-range increases
-    by several cells.
+    These scatterers are out of focus: for each row of pixels between them and the patch, their blur in cross-range
+    increases by several pixels.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)

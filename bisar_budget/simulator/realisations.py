@@ -193,12 +193,14 @@ _MOTION_DRAWS: Mapping[
 def _drawn_by_axis(
     motion: MotionError, figure: InertialFigure, times: Floats, draws: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Floats, Floats]]:
-    """Draw the errors of an inertial sensor for each axis, scaled so that the largest component is 1.
+    """Draw the position error and the tilt that an error of an inertial sensor causes, for each axis of the sensor.
 
-    `figure` is a data-sheet value of the sensor, such as the gyro bias; its components are the values for the three
-    axes. Yields the index of the axis, the position error (draws, times), and the tilt (draws, times). The position
-    error is computed as if one unit of the sensor error caused an acceleration error of 1 m/s². To obtain the actual
-    position error, the caller multiplies it by the acceleration error per unit. An axis without an error is omitted.
+    `figure` is the data-sheet value that describes the sensor error, such as the gyro bias; the mission states it for
+    each of the three axes. Before the errors are drawn, the three values are divided by the largest of them, which
+    becomes 1. Yields the index of the axis, the position error (draws, times), and the tilt (draws, times). The
+    position error is computed as if one unit of the sensor error caused an acceleration error of 1 m/s². To obtain
+    the actual position error, the caller multiplies it by the acceleration error per unit. An axis without an error
+    is omitted.
     """
     _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure.key, None) or (1.0, 1.0, 1.0)))
     for axis, size in enumerate(sizes):

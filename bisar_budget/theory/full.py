@@ -197,7 +197,11 @@ def cubic_phase(coefficients: Sequence[Expr]) -> Expr:
 
 
 def displacement_coefficients() -> tuple[Expr, ...]:
-    """Change of the coefficients β₀ … β₄ due to a displacement x̂ = (x̂, ŷ) of the image: +s⁽ⁿ⁾·x̂/n!. [m/sⁿ]"""
+    """Terms s⁽ⁿ⁾·x̂/n! [m/sⁿ] that a displacement x̂ of the image adds to the range-error coefficients β₀ … β₄.
+
+    x̂ is the horizontal vector `DISPLACEMENT`. The vector s is the horizontal part of u_t + u_r, the sum of the unit
+    vectors to both platforms, and s⁽ⁿ⁾ is its derivative of order n at mid-aperture.
+    """
     return tuple(s.dot(DISPLACEMENT) / factorial(n) for n, s in enumerate(ground_history()))
 
 

@@ -240,9 +240,9 @@ class _Sizes(PointCollection):
         raise _NotFormedError(f"{count} weights are not needed")
 
     def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CUT_CELLS, **_: object) -> Chip:
-        """Record the size of an image that is a single line, and raise `_NotFormedError` instead of forming it.
+        """Record the size of a pair of single-line images, and raise `_NotFormedError` instead of forming an image.
 
-        The recorded size includes the image of the same size with which it would be compared.
+        The size of a pair is recorded because the image would be compared with a second image of the same size.
         """
         self._require_room(cells, 0)
         self.asked.append(_size(cells, 1))

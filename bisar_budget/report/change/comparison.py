@@ -510,7 +510,10 @@ class Gate(NamedTuple):
         return self._replace(allowed=(allowed,))
 
     def refusal(self, id: str, words: str, file: str) -> Refusal:
-        """Make the refusal of a change; it is marked as allowed if `id` or `file:id` matches an item of `allowed`."""
+        """Create a `Refusal` with the id of the refused change and the text `words`.
+
+        Its field `is_allowed` is True if `id` or `file:id` matches an item of `allowed`.
+        """
         names = (id, f"{file}:{id}")
         return Refusal(
             id,

@@ -186,7 +186,7 @@ def _judges_each_alone(findings: MissionFindings) -> bool:
 
 
 def _counts(findings: MissionFindings) -> str:
-    """Text with the number of rows of each status, and the waivers."""
+    """Text that gives the number of rows of each status and names the waivers."""
     counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in findings.summary.items())
     waivers = [waiver.id for waiver in findings.waived_by]
     return f"{counts}; {waiver_names(waivers)}" if waivers else counts
