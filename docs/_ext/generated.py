@@ -140,6 +140,7 @@ def _documents() -> list[dict[str, Any]]:
         ),
         ("specs/missions/gps_aircraft_direct_path.yaml",),
         ("specs/missions/sentinel1_aircraft_log.yaml",),
+        ("specs/missions/uav_stim300.yaml",),
         ("no such file.yaml",),
         ("specs/missions/rigling_moses_section_v.yaml", "--set", "radar.bandwidth=200 m"),
     )
