@@ -87,16 +87,18 @@ def compare_parts(mission: Mission, question: Question, progress: Progress) -> C
         kinds=search.kinds,
         kept=tuple(search.given) if len(search.given) > 1 else (),
         overridden=tuple(sorted({figure for candidate in tried for figure in candidate.stated})),
-        parts=tuple(sorted(_with_silence(states), key=_order)),
+        parts=tuple(sorted(_with_silence(states, key), key=_order)),
         changes=mission.changes,
     )
 
 
-def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
+def _with_silence(states: Sequence[PartState], key: str) -> Iterator[PartState]:
     """Yield the states with `silent_on` filled in.
 
-    `silent_on` lists the figures that other parts of the same kind state but this part does not.
+    `silent_on` lists the figures that other parts of the same kind state but this part does not. It is empty for an
+    inertial unit of an aided navigation: its scale factor only widens the prior of a bias.
     """
+    is_aided = ".navigation." in key
     for state in states:
         if state.standing.status == "error":
             yield state
@@ -106,6 +108,8 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
         )
         if state.kind == "oscillator":  # its forms of noise replace each other
             figures_of_kind = {figure: None for figure in figures_of_kind if figure == "acceleration_sensitivity"}
+        if is_aided and state.kind == "imu":  # navigation refuses units without a needed figure
+            figures_of_kind = {}
         yield state._replace(silent_on=tuple(figure for figure in figures_of_kind if figure not in state.figures))
 
 

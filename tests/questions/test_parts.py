@@ -91,7 +91,16 @@ def test_the_part_of_the_file_is_marked_and_its_figures_are_said() -> None:
     by_id = {part.id: part for part in found.parts}
     assert by_id["zed-x20p-rtk"].figures == ("position",)
     assert by_id["zed-x20p-rtk"].silent_on == ("velocity",)
-    assert by_id["stim300"].silent_on == ()
+    assert by_id["stim300"].silent_on == ("accelerometer_scale_factor",)
+    assert by_id["stim300-r9"].silent_on == ()
+
+
+def test_a_unit_without_a_scale_factor_is_whole_in_an_aided_navigation() -> None:
+    """The scale factor only widens the prior of a bias: a mark at 12 of 15 units said nothing."""
+    key = "platforms.receiver.motion_error.navigation.imu.sensor"
+    found = ask(key, file=str(MISSIONS / "uav_stim300.yaml"))
+    assert {part.silent_on for part in found.parts} == {()}
+    assert {"stim300", "stim300-r9"} <= {part.id for part in found.complying}
 
 
 def test_figures_with_a_source_each_are_said(tmp_path: Path) -> None:
