@@ -84,6 +84,7 @@ from bisar_budget.settings import SettingsError, project_settings
 Find = Callable[[str], tuple[str, bytes]]  # name of a part to the path and the content of its file
 
 MOTION_ERROR = Section(MotionError)
+AIDED_IMU, AIDED_GNSS = Section(AidedImu), Section(AidedGnss)
 _TEXT = Text()
 _PART_NAME_KEY = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(
@@ -509,10 +510,22 @@ def report_parts(root: Mapping[str, object], find: Find, report: Report) -> None
         if not isinstance(platform, dict):
             continue
         path: KeyPath = ("platforms", name)
-        if motion := _stand_in(MOTION_ERROR, platform.get("motion_error")):
-            _with_sensors(MotionError(**motion), (*path, "motion_error"), find, report, [])
+        motion_path = (*path, "motion_error")
+        content = platform.get("motion_error")
+        if motion := _stand_in(MOTION_ERROR, content):
+            _with_sensors(MotionError(**motion), motion_path, find, report, [])
+        if isinstance(content, dict) and "navigation" not in motion:
+            _report_aiding_parts(content.get("navigation"), (*motion_path, "navigation"), find, report)
         if oscillator := _stand_in(OSCILLATOR, platform.get("oscillator")):
             _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report, [])
+
+
+def _report_aiding_parts(navigation: object, path: KeyPath, find: Find, report: Report) -> None:
+    """Report problems of the parts that a `navigation` names, within a motion error that is invalid."""
+    for kind, reader in (("imu", AIDED_IMU), ("gnss", AIDED_GNSS)):
+        section = reader.each(navigation.get(kind) if isinstance(navigation, dict) else None)
+        if isinstance(sensor := section.get("sensor"), str):
+            _parts_of(sensor, (*path, kind, "sensor"), (kind,), find, report)
 
 
 def _stand_in(section: Section[object], value: object) -> SectionValues:

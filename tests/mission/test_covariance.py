@@ -48,7 +48,7 @@ class TestIndependentColumns:
 
     @given(loadings, st.integers(1, 5))
     def test_rounded_correlations_are_no_columns_of_their_own(self, rows, rank: int) -> None:
-        """What six decimals leave of a singular correlation is not drawn, however small its pivot."""
+        """A singular correlation has small pivots after rounding to six decimals, and they are not drawn."""
         factor = np.array(rows)[:, :rank] + np.eye(6)[:, :rank]
         sigmas = np.sqrt((factor**2).sum(axis=1))
         if sigmas.min() < 1e-3:
