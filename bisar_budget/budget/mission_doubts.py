@@ -21,8 +21,9 @@ from bisar_budget.constants import (
     MAX_FLIGHT_SPEED_MPS,
 )
 from bisar_budget.effects.effect import NOWHERE, PLATFORMS
+from bisar_budget.effects.navigation_errors import body_axes_of, specific_force
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
+from bisar_budget.geometry import BistaticGeometry, PlatformState, dot, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 
@@ -145,12 +146,47 @@ def has_calm_oscillator(mission: Mission, name: str, path: PlatformState) -> Per
     return oscillator is not None and oscillator.states_sensitivity and is_unshaken(mission, name)
 
 
+# ---------------------------------------------------------------------- aided navigation
+def leaves_out_scale_factor(mission: Mission, name: str, path: PlatformState) -> PerCaseFlag:
+    """Whether a scale factor of an aided navigation may cause more phase in a turn than an image takes unnoticed.
+
+    The result is a Boolean or an array (cases,).
+    """
+    return np.asarray(scale_factor_phase_rad(mission, name, path) > np.asarray(negligible_rad(mission)))
+
+
+def scale_factor_phase_rad(mission: Mission, name: str, path: PlatformState) -> PerCase:
+    """Upper bound on the quadratic phase by the scale factor of an aided navigation on a path that accelerates. [rad]
+
+    The covariance of the navigation does not contain this error. A scale factor s and a constant acceleration a of the
+    path make an acceleration error of at most s·a, which over an aperture time T causes the quadratic phase
+    2π/λ·s·a·T²/8. The bound is derived here. It is zero for a straight path, and in free fall.
+    """
+    navigation = getattr(mission.platforms, name).motion_error.navigation
+    scale = None if navigation is None else navigation.imu.accelerometer_scale_factor
+    if scale is None:
+        return 0.0
+    axes = body_axes_of(np.array(np.broadcast_arrays(*path.velocity), float), path.is_still)
+    # Components of the acceleration error along the body axes; the specific force is zero in free fall.
+    errors = (
+        np.array([factor * dot(axis, force) for factor, axis in zip(scale, axes, strict=True)])
+        for force in (path.acceleration, specific_force(mission, path))
+    )
+    sizes = [np.sqrt(np.sum(np.square(error), axis=0)) for error in errors]
+    acceleration_mps2 = mission.allocation.coverage_factor * np.minimum(*sizes)
+    phase_rad: PerCase = (
+        2 * math.pi / mission.radar.wavelength * acceleration_mps2 * (mission.collection.aperture_time**2 / 8)
+    )
+    return phase_rad
+
+
 MISSION_DOUBTS: Mapping[str, Callable[[Mission, str, PlatformState], PerCaseFlag]] = {
     "satellite-flies-straight": flies_straight,
     "satellite-does-not-fall": does_not_fall,
     "path-is-doubtful": has_doubtful_path,
     "nothing-swings-the-arm": has_idle_arm,
     "nothing-shakes-the-oscillator": has_calm_oscillator,
+    "scale-factor-in-a-turn": leaves_out_scale_factor,
 }
 
 

@@ -12,12 +12,14 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.budget.mission_doubts import leaves_out_scale_factor, scale_factor_phase_rad
 from bisar_budget.effects.aided_navigation import aided_navigation
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.error_kinds.path_kinds import POSITION_KIND, VELOCITY_KIND
 from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES
 from bisar_budget.faults import KeyPath
+from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.navigation import AIDED_IMU_FIGURES, NEEDED_IMU_FIGURES, AidedGnss, AidedImu, Navigation
 from bisar_budget.mission.platforms import MotionError, Platform
@@ -58,6 +60,10 @@ def _of_aided(mission: Mission, navigation: Navigation, error: RandomError) -> I
     share, quantity = errors.remaining_start
     if share > _CONVERGED_FRACTION:
         yield phrases.note("navigation-has-not-converged", platform=error.owner, share=share, quantity=quantity)
+    state: PlatformState = getattr(mission.platforms, error.owner).state
+    if np.all(leaves_out_scale_factor(mission, error.owner, state)):
+        phase = float(scale_factor_phase_rad(mission, error.owner, state))
+        yield phrases.note("scale-factor-in-a-turn", platform=error.owner, phase=phase)
 
 
 def _of_free_running(mission: Mission, name: str, errors: Sequence[RandomError]) -> Note:

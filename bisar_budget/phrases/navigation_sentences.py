@@ -13,8 +13,12 @@ NAVIGATION_SENTENCES: dict[str, str] = {
     ),
     "navigation-has-not-converged": (
         "platforms.{platform}.motion_error.navigation: the filter has not converged: at mid-aperture "
-        "{share:percent .0f} of the {quantity} error assumed at the start remains; add flight before or after the "
+        "the {quantity} error is {share:percent .0f} of the one assumed at the start; add flight before or after the "
         "aperture, or fixes"
+    ),
+    "scale-factor-in-a-turn": (
+        "platforms.{platform}.motion_error.navigation.imu: the path accelerates within the aperture, and the scale "
+        "factor makes a QPE of up to {phase:rad} of it, which no row contains"
     ),
     "sensor-runs-free": (
         "platforms.{platform}.motion_error: the figures of the inertial sensor run free over the aperture, and make "

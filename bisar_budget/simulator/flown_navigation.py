@@ -141,9 +141,10 @@ class _Flights:
         """Transition matrix of a step, and the covariance of its process noise.
 
         The matrix is computed from the series of the exponential, and the covariance by Gauss–Legendre quadrature.
+        The wander of the fixes is a Gauss–Markov process of its own, exact for steps of any duration.
         """
         imu, rate = self.navigation.imu, np.zeros((self.size, self.size))
-        rate[0:3, 3:6] = rate[6:9, 12:15] = np.eye(3)
+        rate[0:3, 3:6] = np.eye(3)
         rate[6:9, 12:15] = rate[3:6, 9:12] = body
         for axis, tilt in enumerate(np.eye(3)):
             rate[3:6, 6 + axis] = np.cross(tilt, force)
@@ -152,17 +153,17 @@ class _Flights:
         densities[6:9, 3:6] = body * np.array(imu.angle_random_walk)
         biases = np.concatenate((imu.accelerometer_bias or (), imu.gyro_bias or ()))
         densities[9:15, 6:12] = np.diag(biases * math.sqrt(2 / BIAS_WALK_TIME_S))
-        if self.wanders:
-            correlation_time = float(self.navigation.gnss.correlation_time or math.inf)
-            rate[_STATE_COUNT:, _STATE_COUNT:] = -np.eye(3) / correlation_time
-            wander = np.zeros((self.size, 3))
-            wander[_STATE_COUNT:] = np.diag(self.start[_STATE_COUNT:] * math.sqrt(2 / correlation_time))
-            densities = np.concatenate((densities, wander), axis=1)
         noise = np.zeros((self.size, self.size))
         for abscissa, weight in zip(*np.polynomial.legendre.leggauss(_QUADRATURE_NODE_COUNT), strict=True):
             moved = _exponential(rate * (duration * (1 - abscissa) / 2)) @ densities
             noise += weight * duration / 2 * moved @ moved.T
-        return _exponential(rate * duration), noise
+        transition = _exponential(rate * duration)
+        if self.wanders:  # a step may be longer than the correlation time, for which no series converges
+            kept = math.exp(-duration / float(self.navigation.gnss.correlation_time or math.inf))
+            wander = slice(_STATE_COUNT, self.size)
+            transition[wander, wander] = kept * np.eye(3)
+            noise[wander, wander] = np.diag(np.square(self.start[wander]) * (1 - kept**2))
+        return transition, noise
 
     def drawn(self, draws: int, rng: np.random.Generator) -> Floats:
         """Draw flights, and return the position errors of the antenna in the aperture, (draws, shown, 3). [m]

@@ -49,6 +49,7 @@ UNITS = {
 }
 RECEIVERS = {
     "RTK": "position: [6 mm, 6 mm, 10 mm], velocity: 30 mm/s",
+    "QUICK": "position: 1 cm, velocity: 3 cm/s, correlation_time: 2 ms",
     "WANDER": "position: 1 cm, velocity: 3 cm/s, correlation_time: 30 s",
 }
 # Geometry, T, unit, receiver, options; QPE, cubic and rest [rad], location [m]; position [m], velocity [m/s], tilt
@@ -440,13 +441,14 @@ def test_covariance_is_that_of_a_dense_batch(is_smoothed: bool, wander_s: float)
 FLOWN = [
     ("A", 2.5, "STIM300", "RTK", {}),
     ("A", 2.5, "STIM300", "RTK", {"method": "filtered"}),
+    ("A", 1, "STIM300", "QUICK", {"before": "5 s", "after": "5 s"}),  # shorter than a step: gave no number
     ("C", 4, "STIM300", "RTK", {"heading": "0.1 deg"}),
     ("B", 6, "MEMS10", "WANDER", {"outages": "[{from: -2 s, to: 3 s}]"}),
 ]
 
 
 @pytest.mark.parametrize(
-    "case", [*FLOWN[:2], *(pytest.param(case, marks=pytest.mark.thorough) for case in FLOWN[2:])], ids=str
+    "case", [*FLOWN[:3], *(pytest.param(case, marks=pytest.mark.thorough) for case in FLOWN[3:])], ids=str
 )
 def test_flights_have_the_covariance(case: tuple[Any, ...]) -> None:
     """Position errors of flights, by Legendre orders and axes, with a lever arm."""

@@ -135,6 +135,27 @@ def test_flights_that_tell_too_little_are_said(name: str) -> None:
     assert [each for each in codes if each.startswith("navigation")] == ([code] if code else [])
 
 
+@pytest.mark.parametrize(
+    ("acceleration", "scale", "is_said"),
+    [("3 m/s^2", "75 ppm", False), ("3 m/s^2", "85 ppm", True), ("0 m/s^2", "10 %", False)],
+)
+def test_a_scale_factor_in_a_turn_is_said(acceleration: str, scale: str, *, is_said: bool) -> None:
+    """s·3 m/s² over 2.5 s at 31.07 mm is 4.5°, a tenth of the requirement, from 166 ppm; 10 % passed unseen.
+
+    QPE = 2π/λ·s·a·T²/8 = s·474 rad. Twice the sigma counts with a coverage factor of 2, so that 83 ppm are the limit.
+    """
+    text = text_of(NAVIGATION.replace("stim300", f"stim300, accelerometer_scale_factor: {scale}"))
+    text = (
+        text.replace(
+            "velocity: [0 m/s, 25 m/s, 0 m/s]",
+            f"velocity: [0 m/s, 25 m/s, 0 m/s]\n    acceleration: [{acceleration}, 0 m/s^2, 0 m/s^2]",
+        )
+        + "allocation: {coverage_factor: 2}\n"
+    )
+    found = check_mission(parse_mission(text, "mission.yaml"), TODAY)
+    assert ("scale-factor-in-a-turn" in [warning.message.code for warning in found.warnings]) == is_said
+
+
 FREE = {
     "beside a receiver of the catalogue": ("sensor: [stim300, mosaic-x5-rtk]", "sensor-runs-free-not-aided"),
     "a part that lacks figures": ("sensor: [hg9900, mosaic-x5-rtk]", "sensor-runs-free"),

@@ -40,6 +40,14 @@ LOOSE = {"location_error": "100 km", "quadratic_phase_error": "6 rad"}
 OCXO = {"phase_noise": {"1 Hz": "-120 dBc/Hz", "1 kHz": "-160 dBc/Hz"}, "frequency": "10 MHz"}
 ARM = {"position": "1 mm", "source": "assumed", "lever_arm": {"arm": ["2 m", "0 m", "0 m"]}}
 
+AIDED = {
+    "navigation": {
+        "imu": {"sensor": "stim300", "accelerometer_scale_factor": "100 ppm"},
+        "gnss": {"sensor": "mosaic-x5-rtk", "rate": "5 Hz"},
+    },
+    "source": "assumed",
+}
+
 
 def mission_of(**changes: object) -> Mission:
     return bb.loads(mission_text(**{**CALM, **changes}))
@@ -113,6 +121,14 @@ TABLE: Mapping[str, tuple[Mission, Sequence[str], str]] = {
         mission_of(**fed(acceleration_sensitivity="1e-9 /g"), platforms__receiver__acceleration=[0, "1 m/s^2", 0]),
         [f"{RECEIVER}.acceleration.1=0,1e-7,1m/s^2"],
         "nothing-shakes-the-oscillator",
+    ),
+    "scale factor of an aided navigation": (
+        mission_of(platforms__receiver__motion_error=AIDED, platforms__receiver__acceleration=[0, "1 m/s^2", 0]),
+        [
+            f"{RECEIVER}.motion_error.navigation.imu.accelerometer_scale_factor=0,10,1000ppm",
+            f"{RECEIVER}.acceleration.1=0,1m/s^2",
+        ],
+        "scale-factor-in-a-turn",
     ),
     "age of elements": (
         BESANCON,

@@ -81,8 +81,11 @@ def _figures(navigation: Navigation) -> Iterator[str]:
         sizes = dict.fromkeys(with_unit(float(size), unit) for size in value)
         yield f"{key} = {', '.join(sizes)}"
     yield f"gnss.rate = {with_unit(navigation.gnss.rate, 'Hz')}"
-    if navigation.gnss.correlation_time is not None:
+    if navigation.gnss.correlation_time is None:
+        yield "gnss.correlation_time: not stated, a new error at each fix"
+    else:
         yield f"gnss.correlation_time = {format_quantity(navigation.gnss.correlation_time, 's')}"
+    yield f"heading = {with_unit(navigation.heading, 'rad')} at the start"
 
 
 def _method(mission: Mission, navigation: Navigation) -> str:
