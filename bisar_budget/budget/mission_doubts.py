@@ -158,8 +158,8 @@ def leaves_out_scale_factor(mission: Mission, name: str, path: PlatformState) ->
 def scale_factor_phase_rad(mission: Mission, name: str, path: PlatformState) -> PerCase:
     """Upper bound on the quadratic phase by the scale factor of an aided navigation on a path that accelerates. [rad]
 
-    The covariance of the navigation does not contain this error. A scale factor s and a constant acceleration a of the
-    path make an acceleration error of at most s·a, which over an aperture time T causes the quadratic phase
+    The covariance of the navigation does not contain this error. A scale factor s and a constant acceleration a of
+    the path make an acceleration error of at most s·a, which over an aperture time T causes the quadratic phase
     2π/λ·s·a·T²/8. The bound is derived here. It is zero for a straight path, and in free fall.
     """
     navigation = getattr(mission.platforms, name).motion_error.navigation
