@@ -124,6 +124,9 @@ class ErrorSource(NamedTuple):
     root-sum-squares include only such errors. An error stated along the track is therefore not counted a second time
     through its components along the scene's axes.
 
+    `bias` is the known, constant part of the error, signed, in the unit of the error. It adds to the part of size
+    `declared`, which has either sign. The coverage factor does not apply to it.
+
     `direction` is a vector in the axes of the scene: the unit vector along which the error moves the platform, or
     zero if the error moves no platform. For a time tag error it is the velocity [m/s] at the nodes of the aperture,
     (nodes, cases), because a small time tag error moves the platform along its velocity. If the error is declared for
@@ -158,6 +161,7 @@ class ErrorSource(NamedTuple):
     of_receiver: Vectors | None = None
     shifts: tuple[VectorArrays, VectorArrays] | None = None
     rates: tuple[Vectors, Vectors] | None = None
+    bias: Any = 0.0
 
     @property
     def id(self) -> str:
@@ -177,6 +181,7 @@ class ErrorSource(NamedTuple):
             direction=_plain_ways(self.direction),
             of_receiver=of_receiver,
             clock=clock,
+            bias=plain(self.bias),
             rates=self.rates and (plain_vector(self.rates[0]), plain_vector(self.rates[1])),
         )
 
