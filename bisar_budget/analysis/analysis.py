@@ -227,6 +227,10 @@ class Case:
         """Return the phases and the displacement that a model gives for a declared error in this case."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
+    def judged(self, model: Model, source: ErrorSource) -> Declared:
+        """Return the effects that a model gives for an error at the sizes that requirements judge, in this case."""
+        return self.analysis.errors.judged(model.name, source).in_one_case(self.place)
+
     def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
         """Displacement of the image, east and north, that a model gives for the tone of a row. [m]
 

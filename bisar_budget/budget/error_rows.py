@@ -78,6 +78,9 @@ class ErrorRows:
         limits = (limit, needs.cubic_phase_error, needs.location_error)
         # A search for the allowable starts from the known effects of the declared error.
         mine, theirs = errors.of_block(gating, block_index), errors.of_block(other_model, block_index)
+        judged_by_mine, judged_by_theirs = (
+            errors.judged_of_block(model, block_index) for model in (gating, other_model)
+        )
         searched = (None, None, None) if self.is_of_sums else limits
         allowed = block.allowed(gating, searched, is_complete=asks_for_all)
         published, full = (mine, theirs) if gating == "published" else (theirs, mine)
@@ -86,15 +89,16 @@ class ErrorRows:
             sources[0].subject,
             np.abs(block.declared),
             allowed.smallest,
-            doubt=errors.doubts(other_model, _is_over(theirs, self.gain, limits, block.is_motion)),
-            without_autofocus=np.where(self.gain > 1, mine.equal_loss / (limit / self.gain), 0.0),
+            doubt=errors.doubts(other_model, _is_over(judged_by_theirs, self.gain, limits, block.is_motion)),
+            without_autofocus=np.where(self.gain > 1, judged_by_mine.equal_loss / (limit / self.gain), 0.0),
+            use=allowed.uses,
             is_info=is_again | (errors.mission.allocation.combine != "each"),
         )
         judged = judged._replace(
             binding=_BINDING[allowed.binding],
             qpe_published_rad=np.abs(published.qpe),
             cubic_rad=np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan),
-            quadratic_use=mine.judged(self.gain) / limit,
+            quadratic_use=judged_by_mine.judged(self.gain) / limit,
             equal_loss_qpe_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.equal_loss, math.nan),
             rest_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.rest, math.nan),
         )
@@ -148,9 +152,9 @@ class ErrorRow(FamilyRow):
         notes, fields = source.notes, dict[str, Any]()
         equal_loss = 0.0
         if source.declared is not None:
-            mine = case.does(model, source)
+            fields = {"displacement_m": case.does(model, source).displacement}
+            mine = case.judged(model, source)
             equal_loss = float(mine.equal_loss)
-            fields = {"displacement_m": mine.displacement}
             if mine.displacement is None and source.is_motion:
                 notes = (*notes, *filter(None, [case.degeneracy(gating)]))
             if status == CODE["fail"]:
@@ -184,7 +188,8 @@ class ErrorRow(FamilyRow):
 def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
     """Write the reason why a row fails, including the requirement that the declared error exceeds.
 
-    `mine` holds the effects of the error in `model`, and `limit` [rad] is the limit of its quadratic phase.
+    `mine` holds the effects of the error in `model`, at the sizes that requirements judge. `limit` [rad] is the limit
+    of its quadratic phase.
     """
     requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
@@ -207,7 +212,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
 
     The note is empty if the error passes in this model. `limit` [rad] is the limit of the quadratic phase.
     """
-    needs, theirs = case.mission.requirements, case.does(other, source)
+    needs, theirs = case.mission.requirements, case.judged(other, source)
     uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
         uses.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))

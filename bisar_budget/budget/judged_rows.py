@@ -223,6 +223,7 @@ class Judging(NamedTuple):
         is_info: PerCaseFlag = False,
         is_unknown: PerCaseFlag = False,
         never_fails: bool = False,
+        use: Floats | None = None,
     ) -> Judged:
         """Judge a row in each case; the first rule that applies gives the status.
 
@@ -237,7 +238,8 @@ class Judging(NamedTuple):
         - the utilization exceeds `warn_above`: `warn`;
         - otherwise: `pass`.
 
-        `declared` is NaN in the cases that do not declare the error.
+        `declared` is NaN in the cases that do not declare the error. `use` is the utilization, if it is not the
+        declared size divided by the allowable.
         """
         shape = (self.cases,) if declared is None else declared.shape  # several rows at once: (rows, cases)
         none = np.full(shape, math.nan)
@@ -245,8 +247,9 @@ class Judging(NamedTuple):
         if declared is None:
             return Judged._with(row_subject, np.full(shape, CODE["not_declared"]), none, allowed, none)
         is_silent = np.isnan(declared)
-        with np.errstate(all="ignore"):
-            use = np.where(np.isnan(allowed) & ~is_silent, 0.0, declared / allowed)
+        if use is None:
+            with np.errstate(all="ignore"):
+                use = np.where(np.isnan(allowed) & ~is_silent, 0.0, declared / allowed)
         status = np.select(
             [
                 is_silent,

@@ -110,7 +110,7 @@ def _contradictions(mission: Mission) -> Iterator[tuple[KeyPath, Note]]:
     worst = {}
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
-        if error.distribution != "normal" or error.position is None or error.velocity is None:
+        if not error.is_measured or error.position is None or error.velocity is None:
             continue
         ways = [
             (abs(velocity) * half / abs(position), abs(position), abs(velocity))

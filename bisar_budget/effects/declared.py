@@ -23,7 +23,8 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase, PerCaseFlag
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT_RATIO
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
-from bisar_budget.effects.sources import ErrorListing
+from bisar_budget.effects.error_quantiles import allowable_size, judged_size
+from bisar_budget.effects.sources import ErrorListing, distribution_of
 from bisar_budget.error_kinds.path_kinds import STATE_KINDS
 from bisar_budget.geometry import BistaticGeometry, GroundVector, Vectors, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
@@ -139,16 +140,21 @@ def point(displacement: tuple[PerCase, PerCase], case: int = 0) -> GroundVector 
 class Allowed(NamedTuple):
     """Allowable sizes of errors according to one model, (errors, cases); NaN where no size reaches a limit.
 
+    An allowable is the largest declared size, with the bias kept, of which the judged size keeps the limits.
+
     `smallest` is the allowable for all requirements. `quadratic` is the allowable for the limit of the quadratic
     phase alone. It equals `smallest` unless it was searched for separately (see `ErrorBlock.allowed`).
 
     `binding` is the index in `LIMITING_REQUIREMENTS` of the requirement that sets the smallest size. If larger errors
     leave no image, `binding` is the length of `LIMITING_REQUIREMENTS`. It is -1 where no size reaches a limit.
+
+    `uses` are utilizations that do not follow from `smallest`, because an error has a bias; otherwise None.
     """
 
     smallest: Floats
     quadratic: Floats
     binding: NDArray[np.int8]
+    uses: Floats | None = None
 
 
 class ImagePlane(NamedTuple):
@@ -232,20 +238,56 @@ class ErrorBlock:
         self.table: DeclaredErrors = weakref.proxy(table)
         self.exact, self.sources, self.cases = table.exact, sources, table.cases
         shape = (len(sources), self.cases)
-        self.declared = np.full(shape, math.nan)
+        self.declared, self.bias = np.full(shape, math.nan), np.zeros(shape)
         self.edge = np.empty(shape)  # position error at the aperture's edge by a unit [m]
         published, full = np.empty((4, *shape)), np.empty((4, *shape))
         for index, source in enumerate(sources):
             if source.declared is not None:
-                self.declared[index] = source.declared
+                self.declared[index], self.bias[index] = source.declared, source.bias
             self.edge[index] = table.edge_of(source)
             for column, numbers in enumerate(zip(source.effect, source.full, strict=True)):
                 published[column, index], full[column, index] = numbers
         self.effects: dict[str, Any] = {"published": Effect(*published), "full": FullEffect(*full)}
         self.is_motion = np.array([[source.is_motion] for source in sources])
+        self.distributions = [distribution_of(table.mission, source) for source in sources]
+        self.is_biased = bool(self.bias.any())
         self.moves = [index for index, source in enumerate(sources) if source.displaces]
         self._per_unit: dict[str, Floats] = {}
         self._follows: PointPaths | None = None
+
+    # ---------------------------------------------------------------- sizes that requirements judge
+    def judged_sizes(self, requirement: str) -> Floats:
+        """Sizes of the errors that a requirement judges, (errors, cases); see `error_quantiles`.
+
+        They have the signs of the declared sizes. Without a bias and a confidence, they are the declared sizes.
+        """
+        confidence = self.table.confidence(requirement)
+        if confidence is None and not self.is_biased:
+            return self.declared
+        sizes = self._by_error(judged_size, np.nan_to_num(self.declared), confidence)
+        sizes = np.copysign(sizes, np.where(self.declared == 0, self.bias, self.declared))
+        return np.where(np.isnan(self.declared), math.nan, sizes)
+
+    def _by_error(
+        self, of: Callable[[str, PerCase, PerCase, float | None], PerCase], sizes: Floats, confidence: float | None
+    ) -> Floats:
+        """Apply a function of `error_quantiles` to the sizes (errors, cases), with each error's distribution."""
+        rows = zip(self.distributions, sizes, self.bias, strict=True)
+        return np.array([of(distribution, size, bias, confidence) for distribution, size, bias in rows])
+
+    def uses(self, reaching: Sequence[Floats | None]) -> Floats:
+        """Largest utilization of each error over the requirements, (errors, cases).
+
+        `reaching` has the sizes at which the errors reach the limit of each of `LIMITING_REQUIREMENTS`, or None. A
+        utilization is the judged size, divided by the size that reaches the limit; 0 where no size reaches it.
+        """
+        uses = np.where(np.isnan(self.declared), math.nan, 0.0)
+        for requirement, reached in zip(LIMITING_REQUIREMENTS, reaching, strict=True):
+            if reached is not None:
+                with np.errstate(all="ignore"):
+                    use = np.abs(self.judged_sizes(requirement)) / np.where(np.isnan(reached), math.inf, reached)
+                uses = np.maximum(uses, use)
+        return uses
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
@@ -510,7 +552,29 @@ class ErrorBlock:
         return size
 
     def allowed(self, model: str, limits: Sequence[PerCase | None], *, is_complete: bool) -> Allowed:
-        """Allowable sizes of the errors according to a model.
+        """Allowable sizes of the errors according to a model; the parameters are those of `reaching`."""
+        confidences = [self.table.confidence(requirement) for requirement in LIMITING_REQUIREMENTS]
+        if not self.is_biased and not any(confidences):
+            return self.reaching(model, limits, is_complete=is_complete)
+        shape = self.declared.shape
+        sizes, ends = np.full((len(limits), *shape), math.nan), np.zeros((len(limits), *shape), dtype=bool)
+        reaching: list[Floats | None] = [None] * len(limits)
+        for index, (limit, confidence) in enumerate(zip(limits, confidences, strict=True)):
+            if limit is not None:
+                alone = [limit if place == index else None for place in range(len(limits))]
+                reached = self.reaching(model, alone, is_complete=is_complete)
+                reaching[index] = reached.smallest
+                sizes[index] = self._by_error(allowable_size, reached.smallest, confidence)
+                ends[index] = reached.binding == len(LIMITING_REQUIREMENTS)
+        has_limit = ~np.isnan(sizes).all(axis=0)
+        first = np.where(np.isnan(sizes), math.inf, sizes).argmin(axis=0)
+        smallest, is_end = (np.take_along_axis(values, first[None], axis=0)[0] for values in (sizes, ends))
+        binding = np.where(is_end, len(LIMITING_REQUIREMENTS), np.where(has_limit, first, -1)).astype(np.int8)
+        uses = self.uses(reaching) if self.is_biased else None
+        return Allowed(smallest, sizes[0] if is_complete else smallest, binding, uses)
+
+    def reaching(self, model: str, limits: Sequence[PerCase | None], *, is_complete: bool) -> Allowed:
+        """Sizes, of either sign, at which the effects of the errors reach limits, according to a model.
 
         Parameters
         ----------
@@ -675,6 +739,7 @@ class DeclaredErrors:
         self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
         self._does: dict[tuple[str, int], Declared] = {}
+        self._judged: dict[tuple[str, int], Declared] = {}
         self._farthest: dict[tuple[str, int], tuple[Floats, Floats]] = {}
 
     def array(self, value: PerCase | PerCaseFlag | None) -> Floats:
@@ -767,6 +832,39 @@ class DeclaredErrors:
         block, index = self._place[error.id]
         return self.blocks[block], index
 
+    def confidence(self, requirement: str) -> float | None:
+        """Probability with which a requirement has to be kept; None if the file states no confidence for it."""
+        return self.mission.requirements.confidence_of(requirement)
+
+    def judged(self, model: str, error: ErrorSource) -> Declared:
+        """Effects of an error at the sizes that requirements judge, according to a model, in arrays (cases,)."""
+        block, index = self._place[error.id]
+        return self.judged_of_block(model, block).of(index)
+
+    def judged_of_block(self, model: str, block: int) -> Declared:
+        """Effects of the errors of a block at the sizes that requirements judge, (errors, cases).
+
+        Each effect is that of the size which its requirement judges. Without a bias and a confidence, it is the
+        effect of the declared size.
+        """
+        key = (model, block)
+        if key not in self._judged:
+            errors, does = self.blocks[block], self.of_block(model, block)
+            if errors.is_biased or any(map(self.confidence, LIMITING_REQUIREMENTS)):
+                quadratic, cubic, location = (
+                    errors.does(model, errors.judged_sizes(requirement)) for requirement in LIMITING_REQUIREMENTS
+                )
+                does = Declared(
+                    quadratic.qpe,
+                    cubic.cubic,
+                    location.displacement,
+                    location.opposite,
+                    quadratic.hidden,
+                    does.rest,
+                )
+            self._judged[key] = does
+        return self._judged[key]
+
     def does(self, model: str, error: ErrorSource) -> Declared:
         """Phases and displacements that a declared error causes according to a model, in arrays (cases,)."""
         block, index = self._place[error.id]
@@ -783,7 +881,9 @@ class DeclaredErrors:
         return self._does[key]
 
     def farthest(self, model: str, error: ErrorSource) -> tuple[Floats, Floats]:
-        """Displacement of the image by a declared error, east and north, for the sign that moves it farther. [m]
+        """Displacement of the image by an error, east and north, for the sign that moves it farther. [m]
+
+        The error has the size that the requirement on the location judges.
 
         Each component is (cases,). See `Declared.farthest`. The displacement is computed for all errors of a block at
         once.
@@ -791,7 +891,7 @@ class DeclaredErrors:
         block, index = self._place[error.id]
         key = (model, block)
         if key not in self._farthest:
-            self._farthest[key] = self.of_block(model, block).farthest
+            self._farthest[key] = self.judged_of_block(model, block).farthest
         east, north = self._farthest[key]
         return east[index], north[index]
 

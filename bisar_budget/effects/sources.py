@@ -73,7 +73,7 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     if source.owner in PLATFORMS:
         error = getattr(mission.platforms, source.owner).motion_error
     assert error is not None
-    return error.distribution
+    return error.distribution_of(source.kind.name)
 
 
 # The evaluators accept and return numbers, or arrays of cases.
@@ -202,7 +202,7 @@ class ErrorListing:
 
     def _of_motion(self, platform_index: int, name: str, kind: StateKind) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
-        values = error.stated(kind.name)
+        values, biases = error.stated(kind.name), error.bias_of(kind.name) or NOWHERE
         scene_rows = _scene_axes(name, kind)
         if not any(self._is_listed(row_subject, values) for row_subject, *_ in scene_rows):
             return
@@ -230,7 +230,7 @@ class ErrorListing:
                 if in_scene:
                     on_axis = values[axis] * self.factor
                 elif covariance is None:
-                    on_axis = self.factor * _along_scene_axis(values, axes, axis, error.distribution)
+                    on_axis = self.factor * _along_scene_axis(values, axes, axis, error.distribution_of(kind.name))
                 else:
                     on_axis = self.factor * _along_covariance(
                         covariance, kind.name, [frame_axis[axis] for frame_axis in axes]
@@ -251,6 +251,7 @@ class ErrorListing:
                 is_independent=in_scene,
                 notes=notes,
                 shifts=flown[index].shifts if falls else None,
+                bias=biases[axis] if in_scene else sum(b * way[axis] for b, way in zip(biases, axes, strict=True)),
             )
         if in_scene or values is None:
             return
@@ -271,6 +272,7 @@ class ErrorListing:
                 notes=notes,
                 shifts=flown[index].shifts if falls else None,
                 rates=flown[index].rates if falls else None,
+                bias=biases[index],
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
@@ -281,7 +283,8 @@ class ErrorListing:
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
         for power, term in enumerate(TIMING_KIND.sizes):
-            value, row_subject = getattr(self.mission.timing_error, term), subject("clock", TIMING_KIND.name, term)
+            timing, row_subject = self.mission.timing_error, subject("clock", TIMING_KIND.name, term)
+            value = timing.stated(term)
             if self._is_listed(row_subject, value) and not (is_set and power < 2):  # `_of_setting` lists these
                 no_limit = (
                     phrases.note("no-quadratic-term-of-clock", term=term)
@@ -289,7 +292,8 @@ class ErrorListing:
                     else phrases.note("clock-is-heard")
                 )
                 terms = TIMING_KIND.clock_size(term).terms()
-                yield self._of_terms(row_subject, value, terms, no_limit, is_heard=is_heard)
+                error = self._of_terms(row_subject, value, terms, no_limit, is_heard=is_heard)
+                yield error._replace(bias=timing.bias.get(term) or 0.0)
         yield from self._of_setting()
         for name in PLATFORMS:
             yield from self._of_aging(name)
@@ -405,7 +409,7 @@ class ErrorListing:
         frames = [path.frame(error.frame) for path in self.geometry.both]
         falls = self._falls((0, 1))
         for kind in STATE_KINDS:
-            values = getattr(error, kind.name)
+            values, biases = error.stated(kind.name), error.bias_of(kind.name) or NOWHERE
             for axis, name in enumerate(names):
                 row_subject = subject("mission", kind.name, name, error.frame)
                 if not self._is_listed(row_subject, values):
@@ -445,6 +449,7 @@ class ErrorListing:
                     of_receiver=None if in_scene else ways[1],
                     shifts=flown and flown.shifts,
                     rates=flown and flown.rates,
+                    bias=biases[axis],
                 )
 
     @staticmethod
@@ -467,12 +472,14 @@ class ErrorListing:
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
-            if error.time_tag is not None:
-                yield self._of_time_tag(name, (platform_index,), error.time_tag, error.source)
+            if error.tag is not None:
+                tag = self._of_time_tag(name, (platform_index,), error.tag, error.source)
+                yield tag._replace(bias=error.bias.get(TIME_TAG_KIND.name) or 0.0)
         common = self.mission.common_motion_error
-        if common is not None and common.time_tag is not None:
+        if common is not None and common.tag is not None:
             note = phrases.note("held-to-the-total", owners="both platforms")
-            yield self._of_time_tag("mission", (0, 1), common.time_tag, common.source, note)
+            tag = self._of_time_tag("mission", (0, 1), common.tag, common.source, note)
+            yield tag._replace(bias=common.bias.get(TIME_TAG_KIND.name) or 0.0)
 
     def _of_time_tag(
         self,

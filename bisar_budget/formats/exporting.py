@@ -29,7 +29,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
-from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, StateKind
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, STATE_KINDS, StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -515,8 +515,9 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
         added[f"{owner}.lever_arm.uncertainty"] = f"{sizes} m"
     if common is not None and common.time_tag is not None:
         added["common.time_tag"] = f"{common.time_tag:.12g} s"
-    if error.distribution != "normal":
-        added[f"{owner}.distribution"] = error.distribution
+    distributions = [error.distribution_of(kind.name) for kind in STATE_KINDS]
+    if set(distributions) != {"normal"}:
+        added[f"{owner}.distribution"] = distributions[0] if len(set(distributions)) == 1 else " ".join(distributions)
     if is_radial:
         return covariance, "RIC_ECI"
     # Columns are the axes of the error's frame in the scene's axes. Rows are the scene's axes in Earth-fixed axes.

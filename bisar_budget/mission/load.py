@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, file_fault, sentences
+from bisar_budget.faults import Fault, MissionError, Problem, SetValue, changes_words, file_fault, sentences
 from bisar_budget.mission.model import (
     MISSION,
     Mission,
@@ -150,6 +150,8 @@ def mission_of(
 
             add_requirements(tree, read_path or reader_of(folder), changes)
         mission = MISSION.read(tree.root, (), tree.report)
+        if mission is not INVALID and mission.requirements.has_confidence:
+            _report_two_confidences(tree)
         if mission is not INVALID and mission.allocation.specify:
             from bisar_budget.mission.changes import report_specified
 
@@ -183,6 +185,17 @@ def mission_of(
     finished = mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes))
     finished = finished._replace(parts=tuple(parts.values()))
     return finished if model is None else finished._replace(allocation=finished.allocation._replace(model=model))
+
+
+def _report_two_confidences(tree: Tree) -> None:
+    """Add a fault to the tree if a coverage factor is stated, although a requirement has a confidence."""
+    allocation = tree.root.get("allocation")
+    if isinstance(allocation, dict) and "coverage_factor" in allocation:
+        problem = "stands beside a requirement with a confidence, which says how many sigmas count"
+        tree.report(
+            ("allocation", "coverage_factor"),
+            Problem(problem, "accepted: one of the two", is_of_key=True),
+        )
 
 
 def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:

@@ -53,6 +53,8 @@ from bisar_budget.mission.readers import (
     Version,
     Weights,
     Whole,
+    WithBias,
+    WithConfidence,
     Words,
     either,
 )
@@ -196,10 +198,16 @@ class EarthOrientation(NamedTuple):
 class TimingError(NamedTuple):
     """Clock error between the platforms, constant + linear·τ + quadratic·τ² + cubic·τ³."""
 
-    constant: Annotated[float | None, Key(Quantity(units.TIME, ge=-1e6, le=1e6))] = None
-    linear: Annotated[float | None, Key(Quantity(units.RATIO, ge=-1e6, le=1e6))] = None
-    quadratic: Annotated[float | None, Key(Quantity(units.RATE, ge=-1e6, le=1e6))] = None
-    cubic: Annotated[float | None, Key(Quantity(units.RATE_SQUARED, ge=-1e6, le=1e6))] = None
+    constant: Annotated[float | None, Key(WithBias(Quantity(units.TIME, ge=-1e6, le=1e6), "ClockConstant"))] = None
+    linear: Annotated[float | None, Key(WithBias(Quantity(units.RATIO, ge=-1e6, le=1e6), "ClockLinear"))] = None
+    quadratic: Annotated[float | None, Key(WithBias(Quantity(units.RATE, ge=-1e6, le=1e6), "ClockQuadratic"))] = None
+    cubic: Annotated[float | None, Key(WithBias(Quantity(units.RATE_SQUARED, ge=-1e6, le=1e6), "ClockCubic"))] = None
+    bias: Mapping[str, float | None] = {}
+
+    def stated(self, term: str) -> float | None:
+        """Size of a term; 0 if the file states only its bias, and None if the file states neither."""
+        size: float | None = getattr(self, term)
+        return 0.0 if size is None and self.bias.get(term) is not None else size
 
 
 class OtherError(NamedTuple):
@@ -248,17 +256,34 @@ DECLARABLE = (*OF_PLATFORMS, *OF_MISSION)
 _OF_ONE_PLATFORM = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
+_QUARTER_TURN_RAD = math.pi / 4
+
+
 class Requirements(NamedTuple):
-    """Requirements: limits that the image has to keep, and errors that the file has to declare."""
+    """Requirements: limits that the image has to keep, and errors that the file has to declare.
+
+    `confidence` maps the key of a limit to the probability with which the limit has to be kept, as text. A limit
+    without a confidence is not in the mapping, or has the value None.
+    """
 
     quadratic_phase_error: Annotated[
-        float, Key(PHASE_REQUIREMENT, "Total for a single error, at the aperture edge; default π/4.")
-    ] = math.pi / 4
-    cubic_phase_error: Annotated[float | None, Key(PHASE_REQUIREMENT, "At the aperture edge.")] = None
+        float,
+        Key(
+            WithConfidence(PHASE_REQUIREMENT, "QuadraticPhaseRequirement", _QUARTER_TURN_RAD),
+            "Total for a single error, at the aperture edge; default π/4.",
+        ),
+    ] = _QUARTER_TURN_RAD
+    cubic_phase_error: Annotated[
+        float | None, Key(WithConfidence(PHASE_REQUIREMENT, "CubicPhaseRequirement"), "At the aperture edge.")
+    ] = None
     pslr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Bounds the echoes that vibration adds. [dB]")] = None
     islr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Bounds the power that vibration adds. [dB]")] = None
     location_error: Annotated[
-        float | None, Key(Quantity(units.LENGTH, gt=0, ge=1e-9, le=1e9), "Displacement of the image on the ground.")
+        float | None,
+        Key(
+            WithConfidence(Quantity(units.LENGTH, gt=0, ge=1e-9, le=1e9), "LocationRequirement"),
+            "Displacement of the image on the ground.",
+        ),
     ] = None
     declare: Annotated[
         tuple[str, ...],
@@ -285,6 +310,17 @@ class Requirements(NamedTuple):
             "requirement_ids and requirement_texts.",
         ),
     ] = None
+    confidence: Mapping[str, str | None] = {}
+
+    @property
+    def has_confidence(self) -> bool:
+        """Whether any limit has to be kept with a stated probability."""
+        return any(confidence is not None for confidence in self.confidence.values())
+
+    def confidence_of(self, key: str) -> float | None:
+        """Probability with which the limit `key` has to be kept; None if the file states no confidence for it."""
+        text = self.confidence.get(key)
+        return None if text is None else float(text)
 
 
 def id_of_requirement(key: str) -> str:

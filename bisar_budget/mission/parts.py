@@ -605,7 +605,7 @@ def _with_sensors(
         elif figures and error.frame != "scene":
             report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
             return INVALID
-        elif figures.keys() & {"position", "velocity"} and error.distribution != "normal":
+        elif any(error.distribution_of(kind) != "normal" for kind in figures.keys() & {"position", "velocity"}):
             report(path, Problem(f"{shown(part.name)} is stated as one sigma", "accepted: distribution: normal"))
             return INVALID
         else:

@@ -550,7 +550,7 @@ def _by_accuracy(
         )
     except PathFileError as unusable:
         raise _UnusablePathError(key, _file_problem(file, unusable)) from None
-    if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
+    if not error.is_measured and error.covariance is None and None in (error.position, error.velocity):
         raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
     variances = [sigma**2 for sigma in (*accuracy.position, *accuracy.velocity)]
     return StatedAccuracy(f"accuracy file {file}", diagonal(variances)), hashlib.sha256(data).hexdigest()
@@ -599,7 +599,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
     kinds = MOTION_KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None
-    if is_complete and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
+    if is_complete and len(kinds) == 2 and error.is_measured and _is_correlated(along):
         covariance = Covariance(tuple(sigmas.tolist()), correlations(along), is_matrix=False)
         of_source = tuple((figure, stated.words) for figure in ("covariance", *kinds))
         return error._replace(covariance=covariance, of_parts=(*error.of_parts, *of_source))
@@ -614,7 +614,7 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
             if stated.covariance is not None:
                 replaced = Overridden(kind, key, stated.words, f"[{', '.join(figure)}]")
                 error = error._replace(overridden=(*error.overridden, replaced))
-        elif error.distribution == "normal":
+        elif error.distribution_of(kind) == "normal":
             figures: SectionValues = {kind: covering_sigmas(block)}
             error = error._replace(**figures, of_parts=(*error.of_parts, (kind, stated.words)))
     return error

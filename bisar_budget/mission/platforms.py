@@ -57,6 +57,7 @@ from bisar_budget.mission.readers import (
     SNAP_COMPONENT,
     VELOCITY,
     Choice,
+    Distributions,
     Invalid,
     Key,
     Quantity,
@@ -65,12 +66,14 @@ from bisar_budget.mission.readers import (
     RegisteredSizes,
     Report,
     Section,
+    SectionValue,
     SectionValues,
     Source,
     Text,
     TextList,
     Triple,
     Whole,
+    WithBias,
     YesNo,
     date_schema,
     either,
@@ -100,7 +103,32 @@ SMOOTHED, RAW = "smoothed", "raw"  # path that a processor uses: the log smoothe
 _LOG_FORMAT_NAMES = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 # Keys of a motion error that describe what `navigation` computes.
 _REPLACED_BY_NAVIGATION = ("imu", "covariance", "random", "sensor")
+_POSITION_ERROR = WithBias(Triple(COORDINATE, or_scalar=True), "PositionError")
+_VELOCITY_ERROR = WithBias(Triple(VELOCITY, or_scalar=True), "VelocityError")
+_ACCELERATION_ERROR = WithBias(Triple(ACCELERATION_COMPONENT, or_scalar=True), "AccelerationError")
+_TIME_TAG_ERROR = WithBias(TIME_TAG, "TimeTagError")
 PART_REFERENCES = either(list, TextList(), Reference())
+
+
+Biases = Mapping[str, SectionValue]
+"""Biases of errors by the keys of these errors: a vector along the axes of a frame, or a number; None if not stated."""
+
+
+def distribution_for(distribution: str | Distributions, kind: str) -> str:
+    """Distribution of the error of a `kind`, such as `velocity`; a mapping does not apply to other kinds of error."""
+    if isinstance(distribution, str):
+        return distribution
+    name: str = getattr(distribution, kind, "normal")
+    return name
+
+
+def _size_of(error: "MotionError | CommonMotionError", kind: str) -> Vector | None:
+    size: Vector | None = getattr(error, kind)
+    return (0.0, 0.0, 0.0) if size is None and error.bias.get(kind) is not None else size
+
+
+def _tag_of(error: "MotionError | CommonMotionError") -> float | None:
+    return 0.0 if error.time_tag is None and error.bias.get(TIME_TAG_KIND.name) is not None else error.time_tag
 
 
 class MotionError(NamedTuple):
@@ -108,7 +136,7 @@ class MotionError(NamedTuple):
 
     `of_parts` contains the figures that come from parts of the catalogue or from the source of the path, as pairs of
     the figure's name and its source. `overridden` lists figures of parts, and of the source of the path, that are
-    replaced by keys of the mission file.
+    replaced by keys of the mission file. `bias` has the biases along the axes of the frame, by the kind of error.
     """
 
     frame: Annotated[
@@ -119,11 +147,9 @@ class MotionError(NamedTuple):
             "cross-track.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
-    acceleration: Annotated[
-        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
-    ] = None
+    position: Annotated[Vector | None, Key(_POSITION_ERROR, POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(_VELOCITY_ERROR, VELOCITY_KIND.description)] = None
+    acceleration: Annotated[Vector | None, Key(_ACCELERATION_ERROR, ACCELERATION_KIND.description)] = None
     covariance: Annotated[
         Covariance | None,
         Key(
@@ -132,7 +158,7 @@ class MotionError(NamedTuple):
             "correlations.",
         ),
     ] = None
-    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
+    distribution: Annotated[str | Distributions, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     vibration: Annotated[Vibration, Key(Section(Vibration))] = Vibration()
     sensor: Annotated[
         str | tuple[str, ...] | None,
@@ -155,7 +181,7 @@ class MotionError(NamedTuple):
     ] = None
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, TIME_TAG_KIND.description),
+        Key(_TIME_TAG_ERROR, TIME_TAG_KIND.description),
     ] = None
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
@@ -167,6 +193,7 @@ class MotionError(NamedTuple):
     source: Source = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
+    bias: Biases = {}
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -186,7 +213,8 @@ class MotionError(NamedTuple):
         replaced = [kind for kind in MOTION_KINDS if values.get(kind) is not None]
         if replaced:
             yield Problem(f"replaces position and velocity, but there is also a {replaced[0]}", at=("covariance",))
-        if values.get("distribution", "normal") != "normal":
+        distribution = values.get("distribution", "normal")
+        if any(distribution_for(distribution, kind) != "normal" for kind in MOTION_KINDS):
             yield Problem("a covariance is that of a normal distribution", "accepted: normal", at=("distribution",))
         if "frame" in values:
             yield from misplaced_axes(covariance, values["frame"])
@@ -199,8 +227,26 @@ class MotionError(NamedTuple):
         """
         if self.covariance is not None and kind in MOTION_KINDS:
             return self.covariance.of(kind)
-        error: Vector | None = getattr(self, kind)
-        return error
+        return _size_of(self, kind)
+
+    def bias_of(self, kind: str) -> Vector | None:
+        """Bias of the error of the given `kind` along the axes of the frame; None if none is stated."""
+        bias: Vector | None = self.bias.get(kind)
+        return bias
+
+    @property
+    def tag(self) -> float | None:
+        """Size of the time tag error; 0 if only its bias is stated. [s]"""
+        return _tag_of(self)
+
+    def distribution_of(self, kind: str) -> str:
+        """Distribution of the error of the given `kind`: `normal`, `uniform` or `bound`."""
+        return distribution_for(self.distribution, kind)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether errors of position and velocity are normal, so that their sizes are one sigma."""
+        return all(self.distribution_of(kind) == "normal" for kind in MOTION_KINDS)
 
     def evidence(self, figure: str) -> str | None:
         """Source of a figure; None if no source is stated.
@@ -243,12 +289,10 @@ class CommonMotionError(NamedTuple):
             "scene: one vector, east, north, up; track, look, ric: the same components in each platform's own axes.",
         ),
     ] = "scene"
-    position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), POSITION_KIND.description)] = None
-    velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), VELOCITY_KIND.description)] = None
-    acceleration: Annotated[
-        Vector | None, Key(Triple(ACCELERATION_COMPONENT, or_scalar=True), ACCELERATION_KIND.description)
-    ] = None
-    distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
+    position: Annotated[Vector | None, Key(_POSITION_ERROR, POSITION_KIND.description)] = None
+    velocity: Annotated[Vector | None, Key(_VELOCITY_ERROR, VELOCITY_KIND.description)] = None
+    acceleration: Annotated[Vector | None, Key(_ACCELERATION_ERROR, ACCELERATION_KIND.description)] = None
+    distribution: Annotated[str | Distributions, Key(DISTRIBUTION, DISTRIBUTION_TEXT)] = "normal"
     random: Annotated[
         tuple[GaussMarkov, ...],
         Key(RANDOM, "Position errors that change within the aperture, the same on both platforms."),
@@ -256,11 +300,30 @@ class CommonMotionError(NamedTuple):
     time_tag: Annotated[
         float | None,
         Key(
-            TIME_TAG,
+            _TIME_TAG_ERROR,
             "As for a platform, if a single clock tags both platforms.",
         ),
     ] = None
     source: Source = None
+    bias: Biases = {}
+
+    def stated(self, kind: str) -> Vector | None:
+        """Error of the given `kind` along the axes of the frame; 0 if only its bias is stated."""
+        return _size_of(self, kind)
+
+    def bias_of(self, kind: str) -> Vector | None:
+        """Bias of the error of the given `kind` along the axes of the frame; None if none is stated."""
+        bias: Vector | None = self.bias.get(kind)
+        return bias
+
+    @property
+    def tag(self) -> float | None:
+        """Size of the time tag error; 0 if only its bias is stated. [s]"""
+        return _tag_of(self)
+
+    def distribution_of(self, kind: str) -> str:
+        """Distribution of the error of the given `kind`: `normal`, `uniform` or `bound`."""
+        return distribution_for(self.distribution, kind)
 
     @property
     def is_stated(self) -> bool:
@@ -268,7 +331,7 @@ class CommonMotionError(NamedTuple):
 
         An error of zero counts as stated. If only axes or a source are given, no error is stated.
         """
-        figures = (self.position, self.velocity, self.acceleration, self.time_tag)
+        figures = (self.position, self.velocity, self.acceleration, self.time_tag, *self.bias.values())
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod

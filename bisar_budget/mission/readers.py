@@ -73,6 +73,17 @@ def date_schema(pattern: str) -> JsonObject:
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
+class Beside(NamedTuple):
+    """A value, and content that the file states beside it, such as the bias beside a sigma.
+
+    A section keeps the value under the key, and the content under the same key in its field `field`, a mapping.
+    """
+
+    value: object
+    field: str
+    content: object
+
+
 class Reader(Generic[T_co]):
     """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare.
 
@@ -744,7 +755,7 @@ class Section(Reader[T_co]):
             report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
             return INVALID
         is_valid = True
-        values = {}
+        values: dict[str, Any] = {}
         for name, item in value.items():
             key = self.keys.get(name)
             if key is None:
@@ -754,6 +765,10 @@ class Section(Reader[T_co]):
                 is_valid = False
                 continue
             value_read = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            if isinstance(value_read, Beside):
+                contents = values.setdefault(value_read.field, {})
+                contents[name] = value_read.content
+                value_read = value_read.value
             if value_read is INVALID or name not in self.defaults or not is_empty(item):
                 values[name] = value_read
         if INVALID in values.values():
@@ -857,6 +872,163 @@ class OneOf(Reader[T_co]):
     def schema(self, definitions: Definitions) -> JsonObject:
         """JSON Schema that accepts each of the forms."""
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
+
+
+class _Pair(Section[Any]):
+    """A section that states a number by two keys. Its schema is named by the kind of number."""
+
+    def __init__(self, name: str, meaning: str, keys: dict[str, Key], required: tuple[str, ...] = ()) -> None:
+        self.name, self.meaning, self.keys, self.required = name, meaning, keys, list(required)
+        self.defaults: dict[str, object] = {key: None for key in keys if key not in required}
+        self.problems, self.any_of = None, tuple(keys)
+        self.kind = dict
+
+    def definition(self, definitions: Definitions) -> JsonObject:
+        """JSON Schema of the section: an object with the two keys."""
+        properties: JsonObject = {}
+        for name, key in self.keys.items():
+            accepted = key.reader.schema(definitions)
+            properties[name] = {"description": key.description, "allOf": [accepted]}
+        return {
+            "description": self.meaning,
+            "type": "object",
+            "properties": properties,
+            **({"required": self.required} if self.required else {"minProperties": 1}),
+            "additionalProperties": False,
+        }
+
+    def schema(self, definitions: Definitions) -> JsonObject:
+        """JSON Schema: a reference to the schema of the section, which the first call adds to `definitions`."""
+        if self.name not in definitions:
+            definitions[self.name] = self.definition(definitions)
+        return {"$ref": f"#/definitions/{self.name}"}
+
+
+SIZE_FIELD, BIAS_FIELD, CONFIDENCE_FIELD = "sigma", "bias", "confidence"
+
+
+class _SizeAndBias(_Pair):
+    """The size of an error, and its bias, which is known, constant and signed.
+
+    The class reads the size as the value of the key, and the bias as content beside it.
+    """
+
+    def read(self, value: object, path: KeyPath, report: Report) -> Any:
+        """Read both; a size that the file does not state is None."""
+        pair = super().read(value, path, report)
+        if pair is INVALID:
+            return INVALID
+        if not pair:
+            report(path, Problem("states neither sigma nor bias", "accepted: {sigma: …, bias: …}"))
+            return INVALID
+        return Beside(pair.get(SIZE_FIELD), BIAS_FIELD, pair.get(BIAS_FIELD))
+
+
+class WithBias(OneOf[Any]):
+    """Reader of the size of an error with an optional bias: a size, or `{sigma: …, bias: …}`.
+
+    Parameters
+    ----------
+    plain : Quantity or Triple
+        Reader of a size without a bias, and of a bias.
+    name : str
+        Name of the form with a bias in the JSON Schema.
+    """
+
+    def __init__(self, plain: "Quantity | Triple", name: str) -> None:
+        keys = {
+            SIZE_FIELD: Key(_without_sign(plain), "Size of the random part, as without a bias."),
+            BIAS_FIELD: Key(plain, "The known, constant part, with its sign."),
+        }
+        self.pair = _SizeAndBias(name, "Size of an error and its bias.", keys)
+        super().__init__(lambda value: self.pair if isinstance(value, dict) else plain, (plain, self.pair))
+
+
+def _without_sign(reader: "Quantity | Triple") -> "Quantity | Triple":
+    """Reader of the same quantity that refuses negative numbers."""
+    if isinstance(reader, Triple):
+        component = _without_sign(reader.component)
+        assert isinstance(component, Quantity)
+        return Triple(component, or_scalar=reader.or_scalar)
+    _, _, lt, le = reader.bounds
+    return Quantity(reader.dimension, ge=0, lt=lt, le=le)
+
+
+class _Confidence(Quantity):
+    """A probability with which a requirement is kept, from 50 % to 99.9999 %.
+
+    The class reads it as a ratio.
+    """
+
+    def leaf(self, value: object) -> float:
+        """Read a probability, such as `95 %` or 0.95."""
+        try:
+            return super().leaf(value)
+        except InvalidValueError as error:
+            if "unit" in error.problem.problem:
+                raise
+            raise InvalidValueError(
+                "must be a probability from 50 % to 99.9999 %", "accepted: such as 95 % or 0.95", error.problem.hint
+            ) from None
+
+
+CONFIDENCE = _Confidence(units.RATIO, ge=0.5, le=0.999999)
+
+
+class _LimitAndConfidence(_Pair):
+    """The limit of a requirement, and the probability with which the mission has to keep it.
+
+    The class reads the limit as the value of the key, and the confidence as content beside it.
+    """
+
+    def __init__(self, limit: "Quantity", name: str, default: float | None) -> None:
+        keys = {
+            "limit": Key(limit, "The limit."),
+            CONFIDENCE_FIELD: Key(CONFIDENCE, "Probability with which the limit is kept, 50 % to 99.9999 %."),
+        }
+        required = () if default is not None else ("limit",)
+        super().__init__(name, "A limit and the confidence with which it is kept.", keys, required)
+        self.default = default
+
+    def read(self, value: object, path: KeyPath, report: Report) -> Any:
+        """Read both; without a confidence, the limit is that of the errors as they are declared."""
+        pair = super().read(value, path, report)
+        if pair is INVALID:
+            return INVALID
+        if not pair:
+            report(path, Problem("states no limit", "accepted: {limit: …, confidence: …}"))
+            return INVALID
+        confidence = pair.get(CONFIDENCE_FIELD)
+        # As text it is a part of the form of a mission: cases with different confidences are not one array.
+        text = None if confidence is None else repr(confidence)
+        return Beside(pair.get("limit", self.default), CONFIDENCE_FIELD, text)
+
+
+class WithConfidence(OneOf[Any]):
+    """Reader of a requirement: a limit, or `{limit: …, confidence: …}`.
+
+    `default` is the limit of a section that states only a confidence; None if such a section is refused.
+    """
+
+    def __init__(self, limit: "Quantity", name: str, default: float | None = None) -> None:
+        pair = _LimitAndConfidence(limit, name, default)
+        self.limit = limit
+        super().__init__(lambda value: pair if isinstance(value, dict) else limit, (limit, pair))
+
+
+class Level(Quantity):
+    """A level that a requirement limits; it is an expectation over all errors, and has no confidence.
+
+    The class reads it like any quantity, and explains the refusal of a confidence.
+    """
+
+    def read(self, value: object, path: KeyPath, report: Report) -> float | Invalid:
+        """Read the level; a mapping is refused."""
+        if not isinstance(value, dict):
+            return super().read(value, path, report)
+        problem = "is an expectation over all errors, and has no confidence"
+        report(path, Problem(problem, "accepted: a level alone, such as -20 dB"))
+        return INVALID
 
 
 Points = tuple[tuple[float, float], ...]
@@ -1003,8 +1175,22 @@ PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
 # A phase error of a full turn at the aperture edge leaves no mainlobe. The bound also refuses 45 without a unit,
 # which would be seven turns.
 PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
-SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
+SIDELOBE_REQUIREMENT = Level(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
-DISTRIBUTION = Choice("normal", "uniform", "bound")
-DISTRIBUTION_TEXT = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+_DISTRIBUTION = Choice("normal", "uniform", "bound")
+
+
+class Distributions(NamedTuple):
+    """Distributions of the errors of a motion, one for each kind of error."""
+
+    position: Annotated[str, Key(_DISTRIBUTION)] = "normal"
+    velocity: Annotated[str, Key(_DISTRIBUTION)] = "normal"
+    acceleration: Annotated[str, Key(_DISTRIBUTION)] = "normal"
+
+
+DISTRIBUTION = either(dict, Section(Distributions), _DISTRIBUTION)
+DISTRIBUTION_TEXT = (
+    "normal: the values are one sigma; uniform, bound: they are not exceeded. One word, or one for each of position, "
+    "velocity and acceleration."
+)
 Source = Annotated[str | None, Key(Text(), "Source of the values; shown as evidence.")]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.error_kinds.path_kinds import StateKind
+from bisar_budget.error_kinds.path_kinds import STATE_KINDS, StateKind
 from bisar_budget.error_kinds.registry import names_of_named_kinds
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
@@ -321,9 +321,14 @@ def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
         (f"platforms.{name}.motion_error", attrgetter(f"platforms.{name}.motion_error")) for name in PLATFORMS
     ]
     for key, section in (*sections, ("common_motion_error", attrgetter("common_motion_error"))):
-        old, new = (getattr(section(mission), "distribution", None) for mission in (before, after))
-        if old and new and _WIDEST_FIRST.index(new) > _WIDEST_FIRST.index(old):
-            yield Loosened(f"{key}.distribution", old, new)
+        old, new = (section(mission) for mission in (before, after))
+        if old is None or new is None:
+            continue
+        for kind in STATE_KINDS:
+            was, became = old.distribution_of(kind.name), new.distribution_of(kind.name)
+            if _WIDEST_FIRST.index(became) > _WIDEST_FIRST.index(was):
+                yield Loosened(f"{key}.distribution", was, became)
+                break
 
 
 def _declared(findings: MissionFindings) -> dict[str, bool]:

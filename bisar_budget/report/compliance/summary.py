@@ -13,7 +13,7 @@ from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Document
-from bisar_budget.mission.platforms import Platforms
+from bisar_budget.mission.platforms import CommonMotionError, MotionError, Platforms
 from bisar_budget.mission.propagation import Propagation
 from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.report import Style
@@ -535,12 +535,12 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
         if any(error.stated(kind.name) for kind in STATE_KINDS):
-            text = _DISTRIBUTION_WORDS[error.distribution]
+            text = _distribution_words(error)
             text += ", position and velocity by their covariance" if error.covariance is not None else ""
             yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {text}"
     common = mission.common_motion_error
     if common is not None:
-        text = _DISTRIBUTION_WORDS[common.distribution]
+        text = _distribution_words(common)
         frame = (
             "along the axes of the scene"
             if common.frame == "scene"
@@ -658,3 +658,11 @@ def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
         yield value_from("clock", "the direct path; the full model decides", ("synchronization", "method"))
     yield value_from("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
     yield value_from("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
+
+
+def _distribution_words(error: MotionError | CommonMotionError) -> str:
+    """Distribution of a motion error in words; one for each kind of error where they differ."""
+    words = {kind.name: _DISTRIBUTION_WORDS[error.distribution_of(kind.name)] for kind in STATE_KINDS}
+    if len(set(words.values())) == 1:
+        return words["position"]
+    return "; ".join(f"{kind}: {text}" for kind, text in words.items())

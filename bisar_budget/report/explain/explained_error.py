@@ -62,7 +62,7 @@ def _rotated_declaration(mission: Mission, source: ErrorSource, axis: str) -> It
     if covariance is not None:
         text = _quadratic_form(products, covariance.block(kind))
         rule = "a covariance turns as AᵀCA"
-    elif error.distribution == "normal":
+    elif error.distribution_of(kind) == "normal":
         text = "sqrt(" + " + ".join(f"({product})^2" for product in products) + ")"
         rule = "one-sigma values turn like a covariance"
     else:
