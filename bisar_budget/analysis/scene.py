@@ -31,7 +31,7 @@ from bisar_budget.analysis.scene_random import RandomPhases
 from bisar_budget.arrays import Booleans, Floats, Indices, PerCase
 from bisar_budget.constants import UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
-from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.declared import QUADRATIC, DeclaredErrors
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import MIN_SINE, degeneracy
@@ -217,6 +217,9 @@ class ScenePhases:
     A place is a ground point of the scene in one of the cases. Most arrays have a first axis "errors and parts". It
     holds first the errors of motion and clocks (`members`), then the independent parts of which the random errors are
     composed (`scene_random`).
+
+    The errors have the sizes that the requirement on the quadratic phase judges. Under root-sum-square with a
+    confidence, the combination is exact for normal errors without a bias.
     """
 
     def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError] = ()) -> None:
@@ -230,7 +233,7 @@ class ScenePhases:
         )
         self.small = SmallErrors.of([errors.lanes(error) for error in self.members])
         shape = (len(self.members), errors.cases)
-        self.sizes = np.array([errors.array(error.declared) for error in self.members]).reshape(shape)
+        self.sizes = np.array([errors.judged_size(error, QUADRATIC) for error in self.members]).reshape(shape)
         per_unit = [errors.array(error.full.qpe) for error in self.members]
         self.centre = np.concatenate((np.array(per_unit).reshape(shape) * self.sizes, self.random.centre))
         self.is_large = np.zeros(self.centre.shape, dtype=bool)
@@ -394,7 +397,7 @@ class ScenePhases:
         """
         exactly = self.centre.copy()
         for index, error in enumerate(self.members):
-            exactly[index] = self.errors.does("full", error).qpe
+            exactly[index] = self.errors.judged("full", error).qpe
         return np.where(self.is_large, exactly - self.centre, 0.0)
 
     # ------------------------------------------------------------------ circles

@@ -40,7 +40,8 @@ from bisar_budget.effects.air_delays import (
     seen_course,
     zenith_courses,
 )
-from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.declared import QUADRATIC, DeclaredErrors
+from bisar_budget.effects.error_quantiles import quantile_factor
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.effects.random_effect import (
     FEWEST_EFFECT_NODES,
@@ -218,7 +219,8 @@ def _at_random(
         subject, moves = error.subject, error.kind.moves
         if error.declared is None or error.counted_in:
             continue
-        size = errors.array(error.declared)
+        factor = quantile_factor("normal", errors.confidence(QUADRATIC)) if error.is_covered else 1.0
+        size = errors.array(error.declared) * factor
         if error.moves:
             yield subject, _Moving(_at_nodes_of(errors, error.moves), size)
         elif moves == "clock":

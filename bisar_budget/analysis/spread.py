@@ -244,7 +244,9 @@ def rests(
     spreads, factor = [], errors.mission.allocation.coverage_factor
     for error in errors.stated:
         if error.is_motion:
+            at_rms = errors.at_rms("full", error)
             rms = np.asarray(errors.does("full", error).rest) / (factor if error.is_covered else 1.0)
+            rms = rms if at_rms is None else np.asarray(at_rms.rest)
             shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
             if shows.any():
                 spreads.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))

@@ -21,9 +21,9 @@ from bisar_budget.effects.combined import (
     displacement_parts,
     phase_parts,
 )
-from bisar_budget.effects.declared import DeclaredErrors
-from bisar_budget.effects.effect import plain
-from bisar_budget.effects.random_effect import RandomError, factor
+from bisar_budget.effects.declared import Declared, DeclaredErrors
+from bisar_budget.effects.effect import ErrorSource, plain
+from bisar_budget.effects.random_effect import RandomEffect, RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Shares
@@ -104,21 +104,36 @@ class Together:
         array = self.errors.array
         for error in self.random:
             if error.declared is not None:
-                effect, coverage = error.effect(self.model), error.coverage(self.errors.mission)
+                effect, coverage = self._effect(error), error.coverage(self.errors.mission)
                 quadratic, cubic, hidden = (
                     array(phase_part * error.declared)
                     for phase_part in (effect.quadratic, effect.cubic, effect.hidden)
                 )
                 phase = DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage)
-                yield phase._replace(hidden_rad=hidden)
+                rms_cubic = array(error.effect(self.model).cubic * error.declared) / coverage
+                yield phase._replace(hidden_rad=hidden, rms_cubic_rad=rms_cubic)
+
+    def _effect(self, error: RandomError) -> RandomEffect:
+        """Effect of one unit of a random error in the form in which the mission's rule combines it; see `_does`."""
+        if self.rule == "rss":
+            return error.effect(self.model)
+        return error.judged_effect(self.model, self.errors.mission.requirements.confidence_of, self.errors.gain)
 
     def _phases_of_stated(self) -> Iterator[DeclaredPhase]:
         factor = self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
-            does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
-            cubic = does.cubic if error.is_motion else None
+            does, coverage = self._does(error), factor if error.is_covered else 1.0
+            cubic, at_rms = does.cubic if error.is_motion else None, self.errors.at_rms(self.model, error)
             phase = DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage)
-            yield phase._replace(hidden_rad=does.hidden)
+            yield phase._replace(hidden_rad=does.hidden, rms_cubic_rad=at_rms and at_rms.cubic)
+
+    def _does(self, error: ErrorSource) -> Declared:
+        """Effects of a declared error in the form in which the mission's rule combines them.
+
+        Root-sum-square combines the declared sizes, and `totals` adds biases and applies a confidence to the sum. The
+        other rules combine the sizes that the requirements judge, each with its bias and confidence.
+        """
+        return (self.errors.does if self.rule == "rss" else self.errors.judged)(self.model, error)
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """List the phases of the declared errors that count against an owner's share of the budget.
@@ -206,7 +221,7 @@ class Together:
         signed. Each item is a pair of row id and phase. Errors without a cubic phase are left out.
         """
         members = self.owed(split, owner)
-        return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
+        return [(phase.row_id, phase.expected_cubic_rad) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
         """Combined cubic phase of the errors that count against an owner's share, without the coverage factor. [rad]
@@ -229,8 +244,8 @@ class Together:
         not 0, this sum is an additional item.
         """
         if rule != "sum":
-            return [(error.subject.id, self.errors.farthest(self.model, error)) for error in self.motion]
-        does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
+            return [(error.subject.id, self._does(error).farthest) for error in self.motion]
+        does = {error.subject.id: self._does(error) for error in self.motion}
         ahead, back = (
             np.array([getattr(effect, side) for effect in does.values()]).reshape(-1, 2, self.errors.cases)
             for side in ("displacement", "opposite")
@@ -243,7 +258,7 @@ class Together:
         moves = []
         for error in self.random:
             if error.declared is not None:
-                effect = error.effect(self.model)
+                effect = self._effect(error)
                 is_open = self.errors.array(error.displaces_unknown) > 0
                 moved = (self.errors.array(component * error.declared) for component in effect[3:5])
                 east, north = (np.where(is_open, 0.0, component) for component in moved)

@@ -88,18 +88,35 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
-def held_effect(mission: Mission, effect: RandomEffect, coverage: PerCase, gain: PerCase = 1.0) -> RandomEffect:
+def held_effect(
+    mission: Mission,
+    effect: RandomEffect,
+    coverage: PerCase,
+    gain: PerCase = 1.0,
+    judged_effect: RandomEffect | None = None,
+) -> RandomEffect:
     """Return the effect of an error in terms of the quantities that the requirements limit.
 
     The quadratic phase of the result is the judged phase, see `RandomEffect.judged`, for the autofocus gain `gain`.
     If there is no requirement on the cubic phase, the power of the cubic phase at one sigma is added to the power
-    that spreads over the image. `coverage` is the coverage factor that `effect` includes.
+    that spreads over the image. `coverage` is the coverage factor that `effect` includes. `judged_effect` is the
+    effect at the quantiles of the requirements; if it is None, `effect` is used.
     """
-    effect = effect._replace(quadratic=effect.judged(gain))
+    held = effect if judged_effect is None else judged_effect
+    held = held._replace(quadratic=held.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
-        return effect
+        return held
     cubic = effect.cubic / coverage
-    return effect._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+    return held._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+
+
+def judged_effect_of(mission: Mission, error: RandomError, model: str, gain: PerCase = 1.0) -> RandomEffect:
+    """Return the effect of one unit of a random error in terms of the quantities that the requirements limit.
+
+    It is the effect at the quantiles of the requirements, in one model; see `held_effect`.
+    """
+    judged_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)
+    return held_effect(mission, error.effect(model), error.coverage(mission), gain, judged_effect)
 
 
 def sizes_at(effect: RandomEffect, limits: Limits) -> list[PerCase]:
@@ -130,19 +147,27 @@ class RandomRows:
             row[:] = value
         return table
 
-    def _effects(self, model: str) -> RandomEffect:
-        """Compute the effects of each random error, per unit of the error, in one model, (errors, cases)."""
-        effects = [error.effect(model) for error in self.errors]
+    def _effects(self, model: str, *, is_judged: bool = False) -> RandomEffect:
+        """Compute the effects of each random error, per unit of the error, in one model, (errors, cases).
+
+        If `is_judged` is true, they are taken at the quantiles of the requirements, and otherwise at one sigma.
+        """
+        confidence_of, gain = self.mission.requirements.confidence_of, self.allocation.autofocus_gain
+        effects = [
+            error.judged_effect(model, confidence_of, gain) if is_judged else error.effect(model)
+            for error in self.errors
+        ]
         quadratic, cubic, spread, east, north, hidden, rest = (
             self._table(column)
             for column in zip(*((*effect[:5], effect.hidden, effect.rest) for effect in effects), strict=True)
         )
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
-    def _sizes(self, model: str, effects: RandomEffect) -> Floats:
+    def _sizes(self, model: str, effects: RandomEffect, judged_effects: RandomEffect) -> Floats:
         """Compute the size at which each error reaches the limit of each requirement, (requirements, errors, cases).
 
-        The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect.
+        The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect. The effects
+        are those of one unit, at one sigma and at the quantiles of the requirements.
         """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
@@ -152,8 +177,8 @@ class RandomRows:
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
         sizes = np.full((len(RANDOM_REQUIREMENTS), len(owners), self.judging.cases), math.inf)
         coverage = self._table([error.coverage(self.mission) for error in self.errors])
-        judged_effects = held_effect(self.mission, effects, coverage, gain)
-        for row, size in zip(sizes, sizes_at(judged_effects, limits), strict=True):
+        held = held_effect(self.mission, effects, coverage, gain, judged_effects)
+        for row, size in zip(sizes, sizes_at(held, limits), strict=True):
             row[:] = size
         return sizes
 
@@ -163,7 +188,13 @@ class RandomRows:
             return
         other_model = OTHER_MODEL[model]
         mine, theirs = self._effects(model), self._effects(other_model)
-        sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other_model, theirs)
+        judged_by_mine, judged_by_theirs = mine, theirs
+        if self.mission.requirements.has_confidence:
+            judged_by_mine, judged_by_theirs = (
+                self._effects(name, is_judged=True) for name in (model, other_model)
+            )
+        sizes = self._sizes(model, mine, judged_by_mine)
+        sizes_of_other = self._sizes(other_model, theirs, judged_by_theirs)
         declared = self._table([math.nan if error.declared is None else error.declared for error in self.errors])
         allocation, smallest, combine = self.allocation, sizes.min(axis=0), self.mission.allocation.combine
         gain = allocation.autofocus_gain
@@ -172,7 +203,7 @@ class RandomRows:
         binds = np.where(is_open, RANDOM_REQUIREMENTS.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
         allowable = np.where(is_limited, smallest, math.nan)
         qpe, limit = (
-            mine.judged(1.0) * declared,
+            judged_by_mine.judged(1.0) * declared,
             self._table([allocation.qpe_limit(error.owner) for error in self.errors]),
         )
         within = qpe / limit
@@ -199,14 +230,16 @@ class RandomRows:
             cubic_rad=mine.cubic * declared,
             # If a sum limits the phase, a row that cannot be judged does not break the quadratic requirement.
             quadratic_use=np.where(
-                is_open & (combine != "each"), math.nan, mine.judged(gain) * declared / (limit * gain)
+                is_open & (combine != "each"), math.nan, judged_by_mine.judged(gain) * declared / (limit * gain)
             ),
         )
         judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
         if self.judging.is_complete:
             by_published, by_full = (
-                np.where(error.judged(gain) > 0, limit * gain / error.judged(gain), math.nan)
-                for error in (published, full)
+                np.where(effect.judged(gain) > 0, limit * gain / effect.judged(gain), math.nan)
+                for effect in (
+                    (judged_by_mine, judged_by_theirs) if model == "published" else (judged_by_theirs, judged_by_mine)
+                )
             )
             judged = judged._replace(
                 allowable_published=by_published,
@@ -680,7 +713,7 @@ REASONS_FOR_NO_EFFECT: Mapping[str, Callable[[Mission, RandomError], Note]] = {
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
     gain, size = allocation.autofocus_gain, error.declared
-    effect = held_effect(mission, error.effect(model), error.coverage(mission), gain)
+    effect = judged_effect_of(mission, error, model, gain)
     limits = limits_for(mission, allocation, error.owner, model, gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
@@ -690,7 +723,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.note("spreads-too-much", level_db=level(effect.spread * size), limit_db=level(limits.spread))
-    unit_effect = error.effect(model)
+    unit_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)
     qpe, hidden = unit_effect.quadratic * size, unit_effect.hidden * size
     over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
     return over.then(allocation.passes_with(qpe, hidden, error.owner, mission))
@@ -721,7 +754,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
     `gating` is the model that judges the error, `published` or `full`.
     """
     other_model, size = OTHER_MODEL[gating], error.declared
-    effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
+    effect = judged_effect_of(mission, error, other_model, autofocus_gain_of(mission))
     if binding == ISLR:
         return phrases.note(
             "other-model-spreads", model=other_model, level_db=_levels(mission, other_model)(effect.spread * size)

@@ -21,7 +21,7 @@ from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.budget.aggregates import untaken_effects
 from bisar_budget.budget.judged_requirements import EXAMPLES, NEGLIGIBLE_FRACTION, TAKEN_BY, UntakenEffect
 from bisar_budget.budget.judged_rows import LIMIT_RATIO, Judged
-from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, held_effect
+from bisar_budget.budget.random_rows import ISLR, RANDOM_REQUIREMENTS, judged_effect_of
 from bisar_budget.effects.air_delays import changing_air
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -242,10 +242,8 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
     takes autofocus into account. The displacement is only the part that is added by the change of the delay. It is
     the square root of the squared displacement with the change minus the squared displacement without the change.
     """
-    effect = error.effect(model)
-    judged_effect = held_effect(
-        analysis.mission, effect, error.coverage(analysis.mission), analysis.allocation.autofocus_gain
-    )
+    effect = error.judged_effect(model, analysis.mission.requirements.confidence_of, analysis.allocation.autofocus_gain)
+    judged_effect = judged_effect_of(analysis.mission, error, model, analysis.allocation.autofocus_gain)
     if key == LOCATION:
         stays = next(declared_error for declared_error in analysis.random if declared_error.id == error.id).effect(
             model

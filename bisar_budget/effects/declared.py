@@ -414,8 +414,11 @@ class ErrorBlock:
 
     @cached_property
     def is_declared_large(self) -> Booleans:
-        """Mark the declared errors whose effects may not be proportional to their size, (errors, cases)."""
-        return self.is_large(self.declared)
+        """Mark the declared errors whose effects may not be proportional to their size, (errors, cases).
+
+        The size is the one that the requirement on the quadratic phase judges.
+        """
+        return self.is_large(self.judged_sizes(QUADRATIC))
 
     @cached_property
     def _is_moving(self) -> Booleans:
@@ -517,13 +520,15 @@ class ErrorBlock:
     def quadratic_by_sign(self) -> Floats:
         """Exact quadratic phases of the declared errors for each sign, positive first, (2, errors, cases). [rad]
 
+        The errors have the sizes that the requirement on the quadratic phase judges.
+
         Values are NaN for errors whose first-order effect is accurate enough, and where the error with this sign
         leaves no image.
         """
         phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
         if is_large.any():
-            points = self.followed(is_large, np.abs(self.declared[is_large]))
+            points = self.followed(is_large, np.abs(self.judged_sizes(QUADRATIC)[is_large]))
             phases[:, is_large] = points[:, point_paths.QUADRATIC]
         return phases
 
@@ -831,6 +836,22 @@ class DeclaredErrors:
         """Return the block that contains an error, and the error's index in the block."""
         block, index = self._place[error.id]
         return self.blocks[block], index
+
+    def judged_size(self, error: ErrorSource, requirement: str) -> Floats:
+        """Size of a declared error that a requirement judges, (cases,), in the unit of the error."""
+        block, index = self.block_of(error)
+        return block.judged_sizes(requirement)[index]
+
+    def at_rms(self, model: str, error: ErrorSource) -> Declared | None:
+        """Effects of the root mean square of a declared error, without the coverage factor, in arrays (cases,).
+
+        The result is None if neither a bias nor a confidence makes it differ from the effects of the declared size.
+        """
+        block, index = self.block_of(error)
+        if not block.is_biased and not any(map(self.confidence, LIMITING_REQUIREMENTS)):
+            return None
+        factor = self.mission.allocation.coverage_factor if error.is_covered else 1.0
+        return block.does(model, np.hypot(block.declared / factor, block.bias)).of(index)
 
     def confidence(self, requirement: str) -> float | None:
         """Probability with which a requirement has to be kept; None if the file states no confidence for it."""

@@ -10,14 +10,16 @@ Sizes may be arrays of any shape (...), and have the unit of the error.
 """
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from statistics import NormalDist
 
 import numpy as np
 
-from bisar_budget.arrays import PerCase
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.random_vector import RandomVector
 
 _STANDARD = NormalDist()
+_VARIANCE_DIGITS = 7  # of a share of the whole variance; a quantile needs fewer
 _STEP_COUNT = 60  # bisections, which leave 1e-18 of the first interval
 # Largest multiple of the distance to a limit at which a sigma is searched for. Beyond it, the probability that the
 # error keeps the limit is below 50 % for every bias.
@@ -108,3 +110,26 @@ def _largest_sigma(limit: float, mean: float, confidence: float) -> float:
         middle = (low + high) / 2
         low, high = (middle, high) if _within(limit, middle, mean) >= confidence else (low, middle)
     return low
+
+
+def normal_length_ratio(covariance: Floats, confidence: float) -> Floats:
+    """Quantile of the length of a normal vector with mean 0, divided by its rms length, (cases,).
+
+    `covariance` (m, m, cases) is the covariance of the vector. The ratio depends on the proportions of the principal
+    variances alone. It is that of a normal number where the covariance is zero or not known.
+    """
+    _, _, cases = covariance.shape
+    total = np.einsum("iic->c", covariance)
+    ratios = np.full(cases, quantile_factor("normal", confidence))
+    is_known = np.flatnonzero(np.isfinite(total) & (total > 0))
+    variances = np.linalg.eigvalsh(np.moveaxis(covariance[..., is_known] / total[is_known], 2, 0))
+    for case, principal in zip(is_known, np.round(variances, _VARIANCE_DIGITS), strict=True):
+        ratios[case] = _length_ratio(tuple(principal.tolist()), confidence)
+    return ratios
+
+
+@lru_cache(maxsize=4096)  # cases of a sweep and checks of one mission have the same proportions
+def _length_ratio(variances: tuple[float, ...], confidence: float) -> float:
+    principal = np.diag(np.sqrt(np.maximum(variances, 0.0)))
+    (quantile,) = RandomVector.of(len(variances), normal=principal).quantiles((confidence,))
+    return quantile

@@ -18,8 +18,9 @@ import numpy as np
 
 from bisar_budget.arrays import Floats, Indices, PerCase, PerCaseFlag
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
-from bisar_budget.effects.declared import ImagePlane, published_planes
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC, ImagePlane, published_planes
 from bisar_budget.effects.effect import Subject, plain
+from bisar_budget.effects.error_quantiles import normal_length_ratio, quantile_factor
 from bisar_budget.effects.range_processes import (
     RangeEffects,
     effect_weights,
@@ -48,6 +49,9 @@ if TYPE_CHECKING:
 FEWEST_EFFECT_NODES, MOST_EFFECT_NODES = 16, 64
 _CANCELLED_SQUARE_FRACTION = VECTOR_ROUNDING_FRACTION * 1e-2  # of the size; a smaller square is rounding
 
+
+# Indices of effects in the order of `range_processes.effect_weights`.
+QUADRATIC_INDEX, PLACE_INDICES, HIDDEN_INDICES = 0, (2, 3), (4, 5, 6, 7)
 
 Value = TypeVar("Value")  # a number, an array (cases,), or a tuple of them
 
@@ -225,6 +229,47 @@ class RandomError(NamedTuple):
     def effect(self, model: str) -> RandomEffect:
         """Effect of one unit of the error in the model with the given name, `full` or `published`."""
         return self.full if model == "full" else self.published
+
+    def judged_effect(
+        self, model: str, confidence_of: Callable[[str], float | None], gain: PerCase
+    ) -> RandomEffect:
+        """Effect of one unit of the error as the requirements judge it: each phase and displacement at its quantile.
+
+        Without a confidence it is the effect at one sigma. `confidence_of` gives the confidence of a requirement, and
+        `gain` is the autofocus gain, which enters the proportion of quadratic and hidden phase. The covariance is
+        that of one sigma.
+        """
+        effect = self.effect(model)
+        quadratic, cubic, location = map(confidence_of, (QUADRATIC, CUBIC, LOCATION))
+        if not self.is_covered or not any((quadratic, cubic, location)):
+            return effect
+        of_phase = self._quantile_ratio(effect, (QUADRATIC_INDEX, *HIDDEN_INDICES), quadratic, gain)
+        of_place = self._quantile_ratio(effect, PLACE_INDICES, location)
+        return effect._replace(
+            quadratic=effect.quadratic * of_phase,
+            hidden=effect.hidden * of_phase,
+            cubic=effect.cubic * quantile_factor("normal", cubic),
+            east=effect.east * of_place,
+            north=effect.north * of_place,
+        )
+
+    @staticmethod
+    def _quantile_ratio(
+        effect: RandomEffect, indices: Sequence[int], confidence: float | None, gain: PerCase = 1.0
+    ) -> PerCase:
+        """Quantile of the length of several effects together, divided by the rms length; 1 without a confidence."""
+        if confidence is None:
+            return 1.0
+        if effect.covariance is None:  # the published model has sigmas only
+            sigmas = (effect.east, effect.north) if len(indices) == 2 else (effect.quadratic,)
+            variances = np.array(np.broadcast_arrays(*(np.atleast_1d(sigma) ** 2 for sigma in sigmas)))
+            covariance = variances[:, None] * np.eye(len(sigmas))[..., None]
+        else:
+            weights = np.ones((len(indices), np.size(gain)))
+            weights[1:] *= gain if len(indices) > 2 else 1.0
+            covariance = effect.covariance.reshape(*effect.covariance.shape[:2], -1)[np.ix_(indices, indices)]
+            covariance = covariance * weights[:, None] * weights
+        return normal_length_ratio(covariance, confidence)
 
 
 class SensorCases:

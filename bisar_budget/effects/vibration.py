@@ -351,6 +351,8 @@ class DeclaredPhase(NamedTuple):
     """Quadratic and cubic phase due to one declared error, as used in sums. [rad]
 
     `cubic_rad` is None for a pure quadratic phase. `coverage` is the coverage factor that both phases include.
+    `rms_cubic_rad` is the root mean square of the cubic phase; if it is None, it is the cubic phase without the
+    coverage factor.
     `is_there` marks the cases in which a vibration is slow; in all other cases its phases are 0.
 
     `hidden_rad` [rad] is combined with the quadratic phase as a root-sum-square. It represents the part of the range
@@ -365,6 +367,12 @@ class DeclaredPhase(NamedTuple):
     coverage: PerCase = 1.0
     is_there: PerCaseFlag = True
     hidden_rad: PerCase = 0.0
+    rms_cubic_rad: Any = None
+
+    @property
+    def expected_cubic_rad(self) -> PerCase:
+        """Root mean square of the cubic phase, with the sign of the cubic phase. [rad]"""
+        return self.cubic_rad / self.coverage if self.rms_cubic_rad is None else self.rms_cubic_rad
 
     def judged(self, gain: PerCase) -> PerCase:
         """Phase to compare with a limit that has been raised by the autofocus gain; see `Declared.judged`. [rad]
