@@ -9,5 +9,6 @@ __all__ = [
     "spread",
     "together",
     "tone_displacement",
+    "variables",
     "vibration_limits",
 ]

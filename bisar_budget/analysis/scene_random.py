@@ -148,11 +148,11 @@ class _Clock(NamedTuple):
     def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
         """Create a clock error from its declared size and the covariance of its effects at the scene centre.
 
-        `covariance` (4, 4, cases) is the covariance in `RandomEffect` for one unit of the error. The four effects are
-        quadratic phase, cubic phase, displacement east, and displacement north. `size` (cases,) is in the unit of the
-        error.
+        `covariance` (8, 8, cases) is the covariance in `RandomEffect` for one unit of the error. Its first four
+        effects are quadratic phase, cubic phase, displacement east, and displacement north. `size` (cases,) is in the
+        unit of the error.
         """
-        joint = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
+        joint = covariance.reshape(8, 8, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
         quadratic, east, north = np.moveaxis(factor(np.moveaxis(joint, 2, 0)), 0, 2) * size
         (a, b), (c, d) = _terms(exact.place_weights, exact)  # displacement by one unit of each term
         with np.errstate(all="ignore"):

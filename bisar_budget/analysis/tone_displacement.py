@@ -55,8 +55,16 @@ class TonePart(NamedTuple):
 
         Each component is given for the phase of the tone at which it is largest.
         """
+        return np.asarray(np.hypot(*self.waves))
+
+    @property
+    def waves(self) -> tuple[Floats, Floats]:
+        """Displacements of the image (east, north) at the phases ψ = 0 and ψ = π/2 of the tone, (2, n) each. [m]
+
+        The motion is A·cos(2πfτ + ψ), with the middle of the aperture at τ = 0.
+        """
         constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
-        return np.asarray(np.hypot(constant - quadratic, linear - cubic))
+        return constant - quadratic, cubic - linear
 
 
 class ToneDisplacement(NamedTuple):

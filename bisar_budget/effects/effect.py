@@ -103,17 +103,30 @@ def plain(column: PerCase | PerCaseFlag, case: int = 0) -> float:
     return float(column.item(case if column.size > 1 else 0))
 
 
-def _plain_way(component: PerCase) -> PerCase:
-    """Convert a component of a direction in a single case to a float.
+def _plain_way(component: PerCase, case: int) -> PerCase:
+    """Convert a component of a direction to a float, for the case with the given index.
 
-    A component that varies over the aperture, (nodes, cases), stays an array.
+    A component that varies over the aperture, (nodes, cases), becomes an array (nodes, 1).
     """
-    return component if np.ndim(component) > 1 else plain(component)
+    if np.ndim(component) < 2:
+        return plain(component, case)
+    return np.asarray(component)[..., [case]] if np.shape(component)[-1] > 1 else component
 
 
-def _plain_ways(direction: Vectors) -> Vectors:
+def _plain_ways(direction: Vectors, case: int = 0) -> Vectors:
     x, y, z = direction
-    return (_plain_way(x), _plain_way(y), _plain_way(z))
+    return (_plain_way(x, case), _plain_way(y, case), _plain_way(z, case))
+
+
+def _vector_in(vector: Vectors, case: int) -> Vector:
+    x, y, z = vector
+    return (plain(x, case), plain(y, case), plain(z, case))
+
+
+def _shift_in(shift: VectorArrays, case: int) -> VectorArrays:
+    """Select one case of the motion of a platform at the nodes; each component becomes (nodes, 1)."""
+    x, y, z = (component[..., [case]] if component.shape[-1] > 1 else component for component in shift)
+    return (x, y, z)
 
 
 class ErrorSource(NamedTuple):
@@ -168,21 +181,25 @@ class ErrorSource(NamedTuple):
         """Id of the error's row."""
         return self.subject.id
 
-    def in_one_case(self) -> "ErrorSource":
-        """Return the error for a single case, with plain numbers in place of arrays over cases."""
-        effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
-        declared = None if self.declared is None else plain(self.declared)
-        clock = self.clock and tuple(map(plain, self.clock))
-        of_receiver = None if self.of_receiver is None else _plain_ways(self.of_receiver)
+    def in_one_case(self, case: int = 0) -> "ErrorSource":
+        """Return the error for the case with the given index, with plain numbers in place of arrays over cases."""
+
+        def number(value: PerCase) -> float:
+            return plain(value, case)
+
+        declared = None if self.declared is None else number(self.declared)
+        of_receiver = None if self.of_receiver is None else _plain_ways(self.of_receiver, case)
+        shifts, rates = self.shifts, self.rates
         return self._replace(
             declared=declared,
-            effect=effect,
-            full=full,
-            direction=_plain_ways(self.direction),
+            effect=Effect._make(map(number, self.effect)),
+            full=FullEffect._make(map(number, self.full)),
+            direction=_plain_ways(self.direction, case),
             of_receiver=of_receiver,
-            clock=clock,
-            bias=plain(self.bias),
-            rates=self.rates and (plain_vector(self.rates[0]), plain_vector(self.rates[1])),
+            clock=self.clock and tuple(map(number, self.clock)),
+            bias=number(self.bias),
+            shifts=shifts and (_shift_in(shifts[0], case), _shift_in(shifts[1], case)),
+            rates=rates and (_vector_in(rates[0], case), _vector_in(rates[1], case)),
         )
 
     def direction_of(self, platform_index: int) -> Vectors:

@@ -323,7 +323,7 @@ def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffe
     )
     published = RandomEffect(quadratic, cubic, spread, east, north)
     (quadratic, cubic, east, north, hidden), covariance = seen.of_orders(counted.covariance)
-    covariance[2:, :, ~is_placed] = covariance[:, 2:, ~is_placed] = 0.0
+    covariance[2:4, :, ~is_placed] = covariance[:, 2:4, ~is_placed] = 0.0
     east, north = (np.where(is_placed, sigma, nothing) for sigma in (east, north))
     return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 

@@ -64,12 +64,15 @@ class RandomEffect(NamedTuple):
     [m/unit] are the sigmas of the displacement. They are NaN if the displacement is unknown, as for a free
     oscillator.
 
-    `covariance` (4, 4, ...) is the covariance of quadratic phase, cubic phase, and displacement east and north, in
-    the products of their units. It is None in the published model, which has only the sigmas.
+    `covariance` (8, 8, ...) is the covariance of quadratic phase, cubic phase, displacement east and north, and the
+    four parts of the hidden phase, in the products of their units and in the order of `effect_weights`. It is None in
+    the published model, which has only the sigmas.
 
     `hidden` [rad/unit] represents the part of the range error that remains for any displacement of the image; this
     part is mainly constant and linear in time. The hidden phase is the quadratic phase that lowers the peak as much
-    as this part does. Autofocus cannot correct it, see `ranges.exact_ranges`.
+    as this part does. Autofocus cannot correct it, see `ranges.exact_ranges`. Its square is the sum of the variances
+    of its four parts. If a line of sight turns by more than a radian, the square also contains the power beyond the
+    cubic order, which is not in `covariance`.
 
     `rest` [rad/unit] is the rms phase beyond the cubic for an error that is not noise, such as a bias. It is the
     value at one sigma, without the coverage factor. It spreads power, as does the phase beyond the cubic due to any
@@ -103,7 +106,7 @@ class RandomEffect(NamedTuple):
     def of(self, case: int) -> "RandomEffect":
         """Return the effect in the case with the given index, as plain numbers.
 
-        The covariance is (4, 4), or None if the effect has no covariance.
+        The covariance is (8, 8), or None if the effect has no covariance.
         """
         covariance = self.covariance
         if covariance is not None:
@@ -539,7 +542,7 @@ def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
 
 
 def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]:
-    """Sigmas of the effects of random errors, and the covariance (4, 4, cases) of phases and displacement.
+    """Sigmas of the effects of random errors, and their covariance (8, 8, cases) without rounding errors.
 
     `covariance` (8, 8, cases) is the covariance of all effects, in the order of `SensorCases.weights`. The result has
     five sigmas: quadratic phase, cubic phase, displacement east, displacement north, and hidden phase. The hidden
@@ -550,9 +553,9 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
-    squares, is_counted = np.where(is_real, squares, 0.0), is_real[:4]
+    squares = np.where(is_real, squares, 0.0)
     hidden = np.sqrt(squares[4:].sum(axis=0))
-    return [*np.sqrt(squares[:4]), hidden], np.where(is_counted & is_counted[:, None], covariance[:4, :4], 0.0)
+    return [*np.sqrt(squares[:4]), hidden], np.where(is_real & is_real[:, None], covariance, 0.0)
 
 
 def factor(covariance: Floats) -> Floats:

@@ -30,9 +30,9 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 
 # Effects, the same in both models, of a stated cubic phase of 1 rad and of a stated displacement of 1 m.
-_CUBIC_EFFECT = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
+_CUBIC_EFFECT = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0] + [0.0] * 6)[..., None])
 _DISPLACEMENT_EFFECT = RandomEffect(
-    0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None]
+    0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5] + [0.0] * 4)[..., None]
 )
 _UNIT_EFFECTS = {"cubic_phase_error": _CUBIC_EFFECT, "location_error": _DISPLACEMENT_EFFECT}
 

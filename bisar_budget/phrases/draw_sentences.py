@@ -8,16 +8,12 @@ DRAW_SENTENCES: dict[str, str] = {
     "drawn-all-at-once": "a draw is the sum of all errors; the rows are judged one by one (allocation.combine: each)",
     "drawn-as-bounds": "{row_ids:list}: drawn as plus or minus the declared value, which has no distribution",
     "vibration-is-not-drawn": (
-        "{row_ids:list}: not drawn, since the effects of vibrations and tones are in check alone"
+        "{row_ids:list}: not drawn, because a wideband vibration only spreads power, which ISLR limits"
     ),
     "stated-power-is-not-drawn": "{row_ids:list}: not drawn, since a stated power is in check alone",
     "unknown-drift-is-not-drawn": (
         "the file does not state {platforms:and platforms.*.oscillator}, by which the clocks drift: the location is "
         "not drawn"
-    ),
-    "hidden-phase-is-not-drawn": (
-        "{row_ids:list}: Monte Carlo draws the quadratic phase; only check adds the phase that a narrow band or a "
-        "turning line of sight hides"
     ),
     "mean-power-is-not-drawn": "the ISLR of sensors and clocks is a mean power: ISLR is not drawn",
     "unset-clocks-are-not-drawn": "the file does not state how the oscillators were set: the location is not drawn",

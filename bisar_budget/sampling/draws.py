@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.variables import FIRST_HIDDEN, ToneMotion, Variable
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
@@ -39,24 +40,12 @@ EXACT_PIECE_DRAWS = 1 << 18  # draws of a piece with exact ranges; divides a chu
 _LINEARITY_DRAWS = 512  # size of the sample that decides whether exact ranges are needed
 _LINEARITY_TOLERANCE_FRACTION = 0.01  # accepted error of the linear model, as a fraction of a limit
 _AFTER_BYTES = 256
+# Fraction of the rms phase that is judged; a smaller hidden phase raises the rms by at most two parts in 10⁴.
+_MIN_HIDDEN_FRACTION = 0.02
+# The quadrature over the aperture with n nodes is exact up to the order 2n − 1. The weights of the effects use up the
+# first orders, and beyond the order πfT the Legendre components of a tone decrease quickly.
+_ORDERS_BESIDE_TONE_COUNT = 7
 _MIN_COMPILED_DRAWS = 1 << 30  # for fewer normal draws, compiling takes more time than Numba saves
-
-
-class Variable(NamedTuple):
-    """One random variable with mean 0 and variance 1, and its effects.
-
-    `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
-    variable causes if its value is 1, each with its size in the unit of the error. For random errors `parts` is
-    empty, because only their effects are known. `effects` are the effects if the value is 1: the quadratic and cubic
-    phase at the aperture edge [rad], and the displacement east and north [m].
-    """
-
-    id: str
-    of: str
-    owner: str
-    distribution: str
-    parts: tuple[tuple[ErrorSource, float], ...]
-    effects: tuple[float, float, float, float]
 
 
 class HeldSum(NamedTuple):
@@ -66,7 +55,8 @@ class HeldSum(NamedTuple):
     summed effects in `Variable.effects`. `limit` is in `unit`. The limit of a quadratic phase error includes the
     `gain` of autofocus. Autofocus does not correct the hidden phase, which is the part of the phase that the
     bandwidth and the turn of the line of sight do not resolve. Before it is compared with this limit, the hidden
-    phase is therefore multiplied by `gain`.
+    phase is therefore multiplied by `gain`. `hides` states whether sums of first-order effects include the hidden
+    phase, see `with_hidden`.
     """
 
     id: str
@@ -75,6 +65,33 @@ class HeldSum(NamedTuple):
     owners: tuple[str, ...]
     columns: tuple[int, ...]  # of the effects: one phase, or east and north
     gain: float = 1.0
+    hides: bool = False
+
+    def covariance(self, variables: Iterable[Variable]) -> Floats:
+        """Covariance of the effects whose squares are summed, including parts of the hidden phase times `gain`.
+
+        `variables` are the variables of the mission. The result is (effects, effects), in the square of `unit`.
+        """
+        members = [variable for variable in variables if variable.owner in self.owners]
+        hidden = range(FIRST_HIDDEN, len(members[0].effects) if self.hides and members else FIRST_HIDDEN)
+        scales = {**dict.fromkeys(self.columns, 1.0), **dict.fromkeys(hidden, self.gain)}
+        return np.array([
+            [scales[a] * scales[b] * math.fsum(member.covariance(a, b) for member in members) for b in scales]
+            for a in scales
+        ])  # fmt: skip
+
+    def is_affected_by(self, variable: Variable) -> bool:
+        """Whether a variable has any of the effects that are summed, whoever its owner is."""
+        return any(map(variable.affects, self.columns)) or (self.hides and variable.hides)
+
+    def with_hidden(self, variables: Sequence[Variable]) -> "HeldSum":
+        """Include the hidden phase if it matters: if it exceeds a fraction of the rms of the judged phase."""
+        if self.columns != (0,):
+            return self
+        whole = self._replace(hides=True)
+        squares = np.diagonal(whole.covariance(variables))
+        is_hidden = squares[1:].sum() > _MIN_HIDDEN_FRACTION**2 * squares.sum()
+        return whole if is_hidden else self
 
 
 class DrawsPiece(NamedTuple):
@@ -143,7 +160,7 @@ def drawing_of(
         """
         if is_exact and variable.parts:
             return any(size for _, size in variable.parts)
-        return any(variable.effects[column] for requirement in judged for column in requirement.columns)
+        return any(requirement.is_affected_by(variable) for requirement in judged)
 
     return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
@@ -204,8 +221,12 @@ class Sums:
     For exact ranges there are the following arrays for each owner. `motion` (2, 3, 3, draws) holds position, velocity
     and acceleration errors of both platforms, `tags` (2, draws) time tag errors of both platforms, and `clock` (4,
     draws) clock coefficients. `registered` holds errors of registered kinds (see `error_kinds`), each with its sizes
-    (draws,). `alone` (4, draws) is for errors of which only the effects are known: quadratic and cubic phase, and
-    displacement east and north.
+    (draws,). `waves` holds the slow vibrations, each with the cosine and the sine of its phase in each draw, (2,
+    draws). `alone` (effects, draws) is for errors and tones of which only the effects are known, in the order of
+    `Variable.effects`.
+
+    `hidden` (parts, draws) are the parts of the hidden phase for each owner. It is empty unless effects are summed
+    and a requirement includes the hidden phase.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -213,11 +234,16 @@ class Sums:
         columns = {column for requirement in drawing.judged for column in requirement.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(columns - {0})} if adds else {}
+        self.effect_count = max((len(variable.effects) for variable in drawing.variables), default=FIRST_HIDDEN)
+        hides = adds and any(requirement.hides for requirement in drawing.judged)
+        shape = (self.effect_count - FIRST_HIDDEN, size)
+        self.hidden = {variable.owner: np.zeros(shape) for variable in drawing.variables} if hides else {}
         self.motion: dict[str, Floats] = {}
         self.tags: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
         self.alone: dict[str, Floats] = {}
         self.registered: dict[str, list[tuple[ErrorSource, Floats]]] = {}
+        self.waves: dict[str, list[tuple[ToneMotion, Floats]]] = {}
         self._exact: dict[tuple[str, ...], ImagePoints] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
@@ -225,24 +251,52 @@ class Sums:
     def clear(self) -> None:
         """Set all sums to zero before the next block of draws."""
         by_name = (self.motion, self.tags, self.clock, self.alone)
-        for kept in (self.phases.values(), self.totals.values(), *(each.values() for each in by_name)):
+        added = (self.phases, self.totals, self.hidden)
+        for kept in (*(each.values() for each in added), *(each.values() for each in by_name)):
             for sums in kept:
                 sums.fill(0.0)
         self.registered.clear()
+        self.waves.clear()
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
         """Add the errors and effects of one variable. `drawn` holds its values, (draws,)."""
-        if self.phases:
-            for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
-                if variable.effects[column]:
-                    np.multiply(drawn, variable.effects[column], out=self._scaled)
-                    target += self._scaled
+        if variable.is_tone:
+            self._add_tone(variable, np.array((np.cos(drawn), np.sin(drawn))))
+            return
+        self._add_to_sums(variable.owner, variable.effects, drawn)
         if self.keeps_motion:
             for source, size in variable.parts:
                 self._add_motion(variable.owner, source, size, drawn)
             if not variable.parts:
                 self._add_effects(variable.owner, variable.effects, drawn)
+
+    def _add_tone(self, variable: Variable, turned: Floats) -> None:
+        """Add a tone. `turned` (2, draws) are the cosine and the sine of its phase in each draw."""
+        effects = (variable.effects, variable.quadrature)
+        for wave, drawn in zip(effects, turned, strict=True):
+            self._add_to_sums(variable.owner, wave, drawn)
+        if self.keeps_motion and variable.motion is not None and self._resolves(variable.motion):
+            self.waves.setdefault(variable.owner, []).append((variable.motion, turned))
+        elif self.keeps_motion:
+            for wave, drawn in zip(effects, turned, strict=True):
+                self._add_effects(variable.owner, wave, drawn)
+
+    def _resolves(self, motion: ToneMotion) -> bool:
+        """Whether the nodes over the aperture are close enough for the effects of a sinusoidal motion."""
+        angle = 2 * math.pi * motion.frequency * float(self.exact.half[0])
+        return 2 * len(self.exact.times) - 1 >= angle + _ORDERS_BESIDE_TONE_COUNT
+
+    def _add_to_sums(self, owner: str, effects: tuple[float, ...], drawn: Floats) -> None:
+        if not self.phases:
+            return
+        targets = [(self.phases[owner], 0), *((total, column) for column, total in self.totals.items())]
+        if self.hidden:
+            targets += [(part, FIRST_HIDDEN + index) for index, part in enumerate(self.hidden[owner])]
+        for target, column in targets:
+            if effects[column]:
+                np.multiply(drawn, effects[column], out=self._scaled)
+                target += self._scaled
 
     def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
         if source.is_time_tag:
@@ -261,10 +315,10 @@ class Sums:
         elif source.clock is not None:
             self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
-            self._add_effects(owner, (size, 0.0, 0.0, 0.0), drawn)
+            self._add_effects(owner, (size, *[0.0] * (self.effect_count - 1)), drawn)
 
     def _add_effects(self, owner: str, effects: tuple[float, ...], drawn: Floats) -> None:
-        self._kept(self.alone, owner, (4,))[:] += np.multiply.outer(effects, drawn)
+        self._kept(self.alone, owner, (self.effect_count,))[:] += np.multiply.outer(effects, drawn)
 
     def _kept(self, where: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
         if owner not in where:
@@ -283,6 +337,9 @@ class Sums:
                 if owner in judged.owners:
                     square += phase
             square *= square
+            if judged.hides:
+                hidden = _sum(self.hidden, judged.owners, np.zeros((0, self.size)))
+                square += judged.gain**2 * np.square(hidden).sum(axis=0)
             return square
         first, *more_columns = judged.columns
         np.multiply(self.totals[first], self.totals[first], out=square)
@@ -299,10 +356,15 @@ class Sums:
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
-        points, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
+        points, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((self.effect_count, 1)))
         by_ranges = (points.quadratic, points.cubic, points.east, points.north)
         square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
-        return square + (judged.gain * points.hidden) ** 2 if judged.columns == (0,) else square
+        if judged.columns != (0,):
+            return square
+        square = square + (judged.gain * points.hidden) ** 2
+        if judged.hides:  # exact ranges give no parts of the hidden phase: the squares add, as they do on average
+            square = square + judged.gain**2 * np.square(alone[FIRST_HIDDEN:]).sum(axis=0)
+        return square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]
@@ -330,7 +392,18 @@ class Sums:
                 shifts[platform] = [
                     shift + of_source for shift, of_source in zip(shifts[platform], moved, strict=True)
                 ]
-        return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
+        range_error = clock_powers @ clock
+        for vibration, turned in (pair for owner in owners for pair in self.waves.get(owner, ())):
+            angle = 2 * math.pi * vibration.frequency * times
+            course = vibration.size * (np.array((np.cos(angle), -np.sin(angle))).T @ turned)
+            if vibration.platform_index is None:
+                range_error = range_error + course
+            else:
+                shifts[vibration.platform_index] = [
+                    shift + component * course
+                    for shift, component in zip(shifts[vibration.platform_index], vibration.way, strict=True)
+                ]
+        return followed(self.exact, range_error, shifts, np.zeros(self.size, dtype=int))
 
 
 def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
@@ -412,9 +485,10 @@ class Drawer:
 def _needs_exact_ranges(drawing: Drawing) -> bool:
     """Whether exact ranges and the linear model differ by more than 1 % of a limit in any draw of a sample.
 
-    The hidden phase, which the bandwidth and the turn of the line of sight do not resolve, is included only in exact
-    ranges. Exact ranges are therefore also needed if the hidden phase changes a total by more than 1 % of a limit.
+    Both include the hidden phase, which the bandwidth and the turn of the line of sight do not resolve.
     """
+    judged = [requirement._replace(hides=requirement.columns == (0,)) for requirement in drawing.judged]
+    drawing = drawing._replace(judged=tuple(judged))
     sums = Sums(drawing, _LINEARITY_DRAWS, adds=True, keeps_motion=True)
     drawn = np.empty(_LINEARITY_DRAWS)
     for variable in drawing.variables:
@@ -484,6 +558,9 @@ class _Stream:
             self._fill_normal(self._generator, out)
             return
         self._generator.random(out=out)
+        if self._distribution == "tone":  # a phase
+            out *= 2 * math.pi
+            return
         out -= 0.5
         if self._distribution == "uniform":
             out *= math.sqrt(12)

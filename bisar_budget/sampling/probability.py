@@ -2,14 +2,15 @@
 
 The result shows whether the root-sum-square and worst-case rules are a good description of the sum of errors. All
 declared errors are drawn at once, their effects according to the full model are added, and the magnitude of the sum
-is compared with the requirement. For small errors the sum is linear in standardized random variables; for large
-errors it is computed from exact ranges (see the module `draws`). A covariance of a position and velocity error gives
-six variables, one along each eigenvector of its correlation matrix.
+is compared with the requirement. For small errors the sum is linear in standardized random variables (see
+`analysis.variables`); for large errors it is computed from exact ranges (see the module `draws`).
 
 Errors are drawn from the distributions themselves, so the coverage factor, which turns sigmas into bounds, is not
-applied. Vibration is not drawn, because its amplitude is declared and its limits concern paired echoes.
+applied. A sinusoidal vibration, and a tone of an oscillator, is drawn with its declared amplitude and a random phase.
+A wideband vibration is not drawn, because it only spreads power.
 """
 
+import cmath
 import math
 from collections.abc import Iterator, Sequence
 
@@ -17,20 +18,19 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import stated_powers
-from bisar_budget.analysis.together import Together, cubics
+from bisar_budget.analysis.together import cubics
+from bisar_budget.analysis.variables import CUBIC, EAST, NORTH, Variable, variables_of
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.declared import QUADRATIC
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
+from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillators import clocks_without_oscillator
-from bisar_budget.effects.random_effect import RandomError
-from bisar_budget.effects.sources import distribution_of
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
-from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, in_turn, joined
+from bisar_budget.sampling.draws import HeldSum, Share, drawing_of, in_turn, joined
 
 CONFIDENCE_LEVEL = 0.95
 DOMINANT_FRACTION = 0.5  # of the variance; an error with a larger share determines the distribution of the sum
@@ -39,11 +39,8 @@ _SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %, so that a warning is ha
 _MATERIAL_FRACTION = 0.1  # of the probability of failure; a smaller difference is not worth a warning
 
 _SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
-_VARIABLE_SUFFIXES = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
-_HIDDEN_FRACTION = 0.1  # of the quadratic phase; a hidden phase of a tenth adds half a percent to the total
-_VARIANCE_ROUNDING_FRACTION = 1e-12  # of a variance; a smaller remainder is a rounding error
-_CORRELATION_ROUNDING_FRACTION = 1e-5  # of a variance; correlations of a file have six decimals
 _CIRCLE_NODES = 4096  # number of angles for the mean of a smooth function on a circle
+_TALBOT_TERMS = 20  # of the inversion of a Laplace transform, which then is accurate to about 1e-9
 
 
 def monte_carlo(
@@ -75,7 +72,7 @@ def monte_carlo(
     mission = analysis.mission
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
-    variables = list(_variables(analysis))
+    variables = variables_of(analysis)
     is_set = not any(error.displaces_unknown for error in analysis.random)
     is_placed = is_set and not clocks_without_oscillator(mission)
     judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
@@ -100,83 +97,6 @@ def monte_carlo(
     )
 
 
-def _variables(analysis: Analysis) -> Iterator[Variable]:
-    mission, full = analysis.mission, analysis.full
-    factor = mission.allocation.coverage_factor
-    singles = {source.id: source for source in analysis.stated}
-    for group in analysis.groups:
-        members = [singles.pop(row_id) for row_id in group.ids]
-        for index, column in independent_columns(np.array(group.correlation, float), _CORRELATION_ROUNDING_FRACTION):
-            sizes = column / factor
-            members_and_sizes = [(s, (s.declared or 0.0) * sizes[i].item()) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", members_and_sizes, full)
-    for source in singles.values():
-        distribution = distribution_of(mission, source)
-        size = abs(source.declared or 0.0) / (factor if source.is_covered else 1.0)
-        if distribution == "uniform":
-            size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
-        yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], full)
-    for error in analysis.random:
-        yield from _of_noise(error, factor)
-
-
-def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
-    """Yield the independent variables of a random error of a sensor, a clock or the atmosphere.
-
-    The effects of these variables are the columns of the Cholesky factor of the covariance of four effects: quadratic
-    phase, cubic phase, and displacement east and north. The first variable causes the whole quadratic phase, and the
-    part of each further effect that is correlated with it. Each following variable causes the part of the next effect
-    that the variables before it do not cause.
-
-    An error to which the coverage factor does not apply is a bound. Its effects are drawn with their full size and a
-    random sign.
-    """
-    if not error.declared or error.full.covariance is None or error.counted_in:
-        return
-    size = error.declared / (factor if error.is_covered else 1.0)  # for an oscillator its effects contain the size
-    distribution = "normal" if error.is_covered else "bound"
-    for index, column in independent_columns(np.array(error.full.covariance) * size**2):
-        variable_id = f"{error.id}{_VARIABLE_SUFFIXES[index]}"
-        yield Variable(variable_id, error.id, error.owner, distribution, (), tuple(column.tolist()))
-
-
-def independent_columns(
-    covariance: Floats, rounding: float = _VARIANCE_ROUNDING_FRACTION
-) -> Iterator[tuple[int, Floats]]:
-    """Yield the columns (n,) of the Cholesky factor of a covariance (n, n), each with its index.
-
-    The covariance may be singular, and its rows may have different units. A column is left out if the columns before
-    it leave less than the fraction `rounding` of its variance. Eigenvectors are not used: equal eigenvalues have any
-    basis of their eigenspace, and LAPACK libraries choose different ones, so that one seed would give different draws
-    on different machines.
-    """
-    variances = np.diagonal(covariance).tolist()
-    for index, variance in enumerate(variances):
-        remaining = covariance[index, index]
-        if remaining > rounding * variance:
-            column = covariance[:, index] / math.sqrt(remaining)
-            covariance = covariance - np.multiply.outer(column, column)
-            yield index, column
-
-
-def _variable(
-    id: str,
-    of: str,
-    owner: str,
-    distribution: str,
-    sources_and_sizes: Sequence[tuple[ErrorSource, float]],
-    full: Model,
-) -> Variable:
-    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sources_and_sizes]
-    effects = (
-        math.fsum(source.full.qpe * size for source, size in sources_and_sizes),
-        math.fsum(source.full.cubic * size for source, size in sources_and_sizes),
-        math.fsum(move[0] for move in moves),
-        math.fsum(move[1] for move in moves),
-    )
-    return Variable(id, of, owner, distribution, tuple(sources_and_sizes), effects)
-
-
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
@@ -186,7 +106,8 @@ def _requirements(
     displacements caused by all errors are known. If any displacement is unknown, the requirement on location error is
     left out.
     """
-    present = {variable.owner for variable in variables}
+    # Most tones only displace the image.
+    present = {v.owner for v in variables if not v.is_tone or v.affects(0) or v.hides}
     every = ("transmitter", "receiver", "clock", "mission")
     owners_by_share = {
         "transmitter": ("transmitter",),
@@ -197,11 +118,12 @@ def _requirements(
     for owner, owners in owners_by_share.items():
         if present.intersection(owners):
             limit = allocation.qpe_allowed(owner)
-            yield HeldSum(subject(owner, QUADRATIC).id, "rad", limit, owners, (0,), allocation.autofocus_gain)
+            requirement = HeldSum(subject(owner, QUADRATIC).id, "rad", limit, owners, (0,), allocation.autofocus_gain)
+            yield requirement.with_hidden(variables)
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
-    displaces = moves or any(variable.effects[2] or variable.effects[3] for variable in variables)
-    if cubic is not None and (moves or any(variable.effects[1] for variable in variables)):
+    displaces = moves or any(variable.affects(EAST) or variable.affects(NORTH) for variable in variables)
+    if cubic is not None and (moves or any(variable.affects(CUBIC) for variable in variables)):
         yield HeldSum("mission.cubic_phase_error", "rad", cubic, every, (1,))
     if location is not None and displaces and is_placed:
         yield HeldSum("mission.location_error", "m", location, every, (2, 3))
@@ -214,7 +136,7 @@ class _Predictions:
     """
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
-        self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
+        self.together = analysis.together("full")
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
@@ -241,7 +163,7 @@ class _Predictions:
         by_error: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
-                square = math.fsum(variable.effects[column] ** 2 for column in judged.columns)
+                square = float(np.trace(judged.covariance([variable])))
                 by_error[variable.of] = by_error.get(variable.of, 0.0) + square
         return by_error
 
@@ -257,9 +179,10 @@ class _Predictions:
 
         Each error has the same variance as with its declared distribution.
         """
-        members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
-        a, b = judged.columns[0], judged.columns[-1]
-        xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
+        covariance = judged.covariance(self.variables)
+        if judged.hides:
+            return _within_limit(judged.limit, covariance)
+        xx, yy, xy = (float(covariance[i, j]) for i, j in ((0, 0), (-1, -1), (0, -1)))
         if len(judged.columns) == 2:
             return _within(judged.limit, xx, yy, xy)
         return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
@@ -284,6 +207,36 @@ def _within(radius: float, xx: float, yy: float, xy: float) -> float:
         square = large * math.cos(angle) ** 2 + small * math.sin(angle) ** 2
         total += math.exp(-(radius**2) / (2 * square)) if square else 0.0
     return 1 - total / _CIRCLE_NODES
+
+
+def _within_limit(radius: float, covariance: Floats) -> float:
+    """Probability that a normal random vector (n,) with mean 0 is no longer than a radius.
+
+    `covariance` (n, n) is its covariance matrix, with the eigenvalues λ. The squared length has the Laplace transform
+    Π(1 + 2λs)^(−1/2), and its distribution function this transform divided by s. The fixed Talbot method of Abate and
+    Valkó inverts it.
+    """
+    squares: list[float] = [square for square in np.linalg.eigvalsh(covariance).tolist() if square > 0]
+    if not squares:
+        return 1.0
+    scale = max(squares)
+    ratio = 2 * _TALBOT_TERMS * scale / (5 * radius**2)
+
+    def transformed(s: complex) -> complex:
+        value = 1 / s
+        for square in squares:
+            value /= cmath.sqrt(1 + 2 * square / scale * s)
+        return value
+
+    reach = radius**2 / scale
+    total = 0.5 * math.exp(ratio * reach) * transformed(complex(ratio)).real
+    for term in range(1, _TALBOT_TERMS):
+        angle = term * math.pi / _TALBOT_TERMS
+        cotangent = 1 / math.tan(angle)
+        s = ratio * angle * complex(cotangent, 1)
+        slope = complex(1, angle + (angle * cotangent - 1) * cotangent)
+        total += (cmath.exp(reach * s) * transformed(s) * slope).real
+    return min(1.0, max(0.0, ratio / _TALBOT_TERMS * total))
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
@@ -350,14 +303,6 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
         )
 
 
-def _hides_phase(error: RandomError) -> bool:
-    """Whether the hidden phase of an error exceeds a tenth of its quadratic phase.
-
-    The hidden phase is the part of the phase that the bandwidth and the turn of the line of sight cannot resolve.
-    """
-    return bool(np.any(error.full.hidden > _HIDDEN_FRACTION * np.abs(error.full.quadratic)))
-
-
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
     """Yield notes on errors that are drawn by a convention of this program, and on errors that are not drawn."""
     if is_exact:
@@ -370,14 +315,10 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     bounds += [error.id for error in analysis.random if not error.is_covered]
     if bounds:
         yield phrases.note("drawn-as-bounds", row_ids=bounds)
-    hidden = [error.id for error in analysis.random if error.declared and _hides_phase(error)]
-    if hidden:
-        yield phrases.note("hidden-phase-is-not-drawn", row_ids=hidden)
     noisy = [name for name in PLATFORMS if getattr(mission.platforms, name).motion_error.vibration.wideband]
-    shaken = [tone.subject.id for tone in analysis.displacing_tones]
-    shaken += [subject(name, "vibration", "wideband").id for name in noisy]
-    if shaken:
-        yield phrases.note("vibration-is-not-drawn", row_ids=shaken)
+    if noisy:
+        row_ids = [subject(name, "vibration", "wideband").id for name in noisy]
+        yield phrases.note("vibration-is-not-drawn", row_ids=row_ids)
     powers = [power.subject.id for power in stated_powers(mission)]
     if powers:
         yield phrases.note("stated-power-is-not-drawn", row_ids=powers)

@@ -11,6 +11,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import differences_at
+from bisar_budget.analysis.variables import Variable
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import parse_mission
@@ -23,7 +24,7 @@ from bisar_budget.ranges.exact_ranges import (
     aperture_nodes,
     followed,
 )
-from bisar_budget.sampling.draws import HeldSum, Sums, Variable, drawing_of
+from bisar_budget.sampling.draws import HeldSum, Sums, drawing_of
 from bisar_budget.verifier.study import Study
 from tests.image_point import Collection, Path, Response, flight, no_error
 

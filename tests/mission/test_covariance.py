@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from bisar_budget.analysis.variables import independent_columns
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.sampling.probability import independent_columns
 from tests.conftest import examples, findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.variables import Variable
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.sampling import draws as drawing
-from bisar_budget.sampling.draws import Variable
 from bisar_budget.sampling.probability import _wilson, _within, monte_carlo
 from tests import reference
 from tests.cli.test_settings import project, table  # noqa: F401
