@@ -41,8 +41,8 @@ from bisar_budget.effects.air_delays import (
     zenith_courses,
 )
 from bisar_budget.effects.declared import QUADRATIC, DeclaredErrors
-from bisar_budget.effects.error_quantiles import quantile_factor
 from bisar_budget.effects.effect import PLATFORMS, Subject
+from bisar_budget.effects.error_quantiles import quantile_factor
 from bisar_budget.effects.random_effect import (
     FEWEST_EFFECT_NODES,
     MOST_EFFECT_NODES,

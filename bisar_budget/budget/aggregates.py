@@ -16,6 +16,7 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.analysis.totals import Totals
 from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
@@ -45,8 +46,9 @@ PULL_IN = "autofocus_pull_in"
 class Aggregates:
     """Builds the budget rows for sums of errors, for an array of cases."""
 
-    def __init__(self, judging: Judging, analysis: Analysis) -> None:
+    def __init__(self, judging: Judging, analysis: Analysis, totals: Totals | None = None) -> None:
         self.judging, self.together, self.array = judging, analysis.together, judging.array
+        self.totals = totals or Totals(analysis)
         self.allocation, self.errors = analysis.allocation, analysis.errors
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
@@ -72,8 +74,13 @@ class Aggregates:
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
         members, their_members = mine.owed(split, owner), theirs.owed(split, owner)
         judged_phases, size_by_theirs = mine.judged_parts(members), theirs.judged(their_members)
-        size = mine.combined(judged_phases)
-        equal_loss = mine.judged(members, gain=1.0) if np.any(gain != 1) else size
+        root_sum_square = mine.combined(judged_phases)
+        size = self._reached(mine, QUADRATIC, root_sum_square, owner, gain)
+        size_by_theirs = self._reached(theirs, QUADRATIC, size_by_theirs, owner, gain)
+        equal_loss, of_full_model = size, size if mine.model == "full" else size_by_theirs
+        if np.any(gain != 1):
+            equal_loss = self._reached(mine, QUADRATIC, mine.judged(members, gain=1.0), owner)
+            of_full_model = equal_loss
         published, full = (members, their_members) if mine.model == "published" else (their_members, members)
         of_full = self.together("full").combined(quadratics(full))
         aggregate = self._row(
@@ -88,9 +95,29 @@ class Aggregates:
             continued=("quadratic", self._of_owners(split, owner)),
             qpe_published_rad=self.together("published").combined(quadratics(published)),
             qpe_full_rad=np.where(np.isfinite(of_full), of_full, math.nan),
+            root_sum_square=root_sum_square,
         )
-        is_full = mine.model == "full"
-        return aggregate.of_equal_loss(equal_loss, equal_loss if is_full else theirs.judged(full, gain=1.0))
+        if mine.model != "full":
+            of_full_model = self._reached(theirs, QUADRATIC, theirs.judged(full, gain=1.0), owner)
+        return aggregate.of_equal_loss(equal_loss, of_full_model)
+
+    def _reached(
+        self, together: Together, requirement: str, combined: Floats, owner: str = "mission", gain: PerCase = 1.0
+    ) -> Floats:
+        """Size that a requirement judges for a sum of errors, (cases,): with biases, and at its confidence.
+
+        `combined` is the sum of the errors by the mission's rule. Under root-sum-square it has neither, and under
+        other rules both are in the single errors.
+        """
+        return self._of_all(together, requirement, combined, owner, gain) if self.combine == "rss" else combined
+
+    def _of_all(
+        self, together: Together, requirement: str, combined: Floats, owner: str = "mission", gain: PerCase = 1.0
+    ) -> Floats:
+        split = self.allocation.qpe
+        return self.totals.reached(
+            together.model, requirement, lambda name: split.includes(name, owner), combined, gain
+        )
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
         """Build the warning row for the mission's total quadratic phase under `combine: each`.
@@ -100,8 +127,10 @@ class Aggregates:
         row, and `theirs` the errors in the other model.
         """
         row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
-        size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
-        limit = self.allocation.qpe_total * self.allocation.autofocus_gain
+        gain = self.allocation.autofocus_gain
+        size = mine.judged(mine.phases)
+        of_all = self._of_all(mine, QUADRATIC, mine.judged(mine.phases, "rss"), gain=gain)
+        limit = self.allocation.qpe_total * gain
         aggregate = self._row(row_subject, True, phases, size, limit, theirs, of_all=of_all)
         is_warning = aggregate.judged.status == CODE["warn"]  # a failing error has its own row
         is_there = aggregate.is_over_of_all & is_warning
@@ -110,7 +139,11 @@ class Aggregates:
 
     def _cubic(self, mine: Together, theirs: Together) -> "Aggregate":
         phases, limit = cubics(mine.phases), self.needs.cubic_phase_error
-        size = mine.combined(phases)
+        of_all: PerCase = math.nan
+        root_sum_square = mine.combined(phases)
+        size = self._reached(mine, CUBIC, root_sum_square)
+        if self.combine == "each":
+            of_all = self._of_all(mine, CUBIC, mine.combined(phases, "rss"))
         return self._row(
             subject("mission", CUBIC),
             self._is_declared(phase for phase in mine.phases if phase.cubic_rad is not None),
@@ -118,27 +151,33 @@ class Aggregates:
             size,
             limit,
             theirs,
-            theirs.combined(cubics(theirs.phases)),
-            mine.combined(phases, "rss") if self.combine == "each" else math.nan,
+            self._reached(theirs, CUBIC, theirs.combined(cubics(theirs.phases))),
+            of_all,
             continued=("cubic", mine.random),
             metric=CUBIC,
             cubic_rad=size,
+            root_sum_square=root_sum_square,
         )
 
     def _location(self, mine: Together, theirs: Together) -> "Aggregate":
         limit = self.needs.location_error
+        of_all: PerCase = math.nan
+        root_sum_square = mine.moved(self.combine)
+        if self.combine == "each":
+            of_all = self._of_all(mine, LOCATION, mine.moved("rss"))
         return self._row(
             subject("mission", LOCATION),
             mine.is_placed,
             (),
-            mine.moved(self.combine),
+            self._reached(mine, LOCATION, root_sum_square),
             limit,
             theirs,
-            theirs.moved(self.combine),
-            mine.moved("rss") if self.combine == "each" else math.nan,
+            self._reached(theirs, LOCATION, theirs.moved(self.combine)),
+            of_all,
             without_value="info" if limit is None else "not_evaluated",
             continued=("displacement", mine.random),
             metric=LOCATION,
+            root_sum_square=root_sum_square,
         )
 
     def _pull_in(self, mine: Together, theirs: Together) -> "Aggregate":
@@ -183,6 +222,7 @@ class Aggregates:
         without_autofocus: PerCase = 0.0,
         never_fails: bool = False,
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
+        root_sum_square: Floats | None = None,
         **fields: Any,
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
@@ -191,7 +231,8 @@ class Aggregates:
         large that no image of the point forms. If `without_value` is given, the sum gets this status instead.
         `continued` is a pair: the kind of effect that the row sums, and the random errors in the sum. A pass becomes
         a warning if it depends on phase noise at frequencies below the first point of a phase-noise mask. A pass that
-        depends on doubtful oscillator noise becomes `not_evaluated`.
+        depends on doubtful oscillator noise becomes `not_evaluated`. `root_sum_square` is the sum at one sigma, if it
+        differs from `size`; the noise of the masks is a part of it.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -204,7 +245,9 @@ class Aggregates:
             by_model = {f"allowable_{model}": limit for model in models}
             is_over_by_other = self.errors.doubts(theirs.model, size_by_theirs > limit * LIMIT_RATIO)
             is_over_of_all = of_all > limit * LIMIT_RATIO
-            rests_on = rests_on_masks(continued[1], continued[0], size, limit)
+            at_one_sigma = size if root_sum_square is None else root_sum_square
+            limit_at_one_sigma = limit * np.where(size > 0, at_one_sigma / size, 1.0)
+            rests_on = rests_on_masks(continued[1], continued[0], at_one_sigma, limit_at_one_sigma)
             is_in_doubt = rests_on_doubted_noise(continued[1], continued[0], OTHER_MODEL[theirs.model], limit)
             is_in_doubt = is_in_doubt & ~(size > limit * LIMIT_RATIO) & (not never_fails)
         judged = self.judging.row(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import scene_edges
+from bisar_budget.analysis.totals import Totals
 from bisar_budget.arrays import Booleans, PerCaseFlag
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, groups_alike, is_asked_for, missing_declarations
@@ -60,10 +61,12 @@ class JudgedMission:
     `rows` are the rows after waivers, in the order of the JSON output. `before` are the same rows before waivers. The
     field `why` of a row gives the reason for its status if the numbers of the row do not decide it. `families` holds
     the rows of each gating model, before the rows of both models are merged. `doubts` maps the code of each warning
-    that casts doubt on the mission to a mask of the cases with this doubt.
+    that casts doubt on the mission to a mask of the cases with this doubt. `totals` are the distributions of the sums
+    of all errors.
     """
 
     analysis: Analysis
+    totals: Totals
     families: Mapping[str, Sequence[FamilyRow]]
     rows: tuple[Judged, ...]
     before: tuple[Judged, ...]
@@ -122,8 +125,9 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     scene = None
     if mission.scene.radius is not None:  # a search around the edge, which only a stated radius needs
         scene = JudgedScene(analysis, scene_edges(analysis.errors, analysis.random, limits, analysis.allocation.qpe))
+    totals = Totals(analysis)
     families = {
-        model: list(_families(model, judging, analysis, errors, vibrations, random, scene))
+        model: list(_families(model, judging, analysis, errors, vibrations, random, scene, totals))
         for model in analysis.gates
     }
     by_model = [_rows(model, rows_of_model, cases) for model, rows_of_model in families.items()]
@@ -170,6 +174,7 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     floor = np.min([_floor(analysis, doubts), *(state.status for state in states)], axis=0)
     return JudgedMission(
         analysis=analysis,
+        totals=totals,
         families=families,
         rows=of_all.rows_with(after),
         before=of_all.rows_with(before),
@@ -194,6 +199,7 @@ def _families(
     vibrations: Vibrations | None,
     random: RandomRows,
     scene: JudgedScene | None,
+    totals: Totals,
 ) -> Iterator[FamilyRow]:
     """Yield all rows, as judged by one model, in the order of the JSON output.
 
@@ -213,7 +219,7 @@ def _families(
         yield pslr_row(judging, analysis.tones, needs.pslr)
     if needs.islr is not None:
         yield from random.islr_rows(model)
-    yield from Aggregates(judging, analysis).rows(model)
+    yield from Aggregates(judging, analysis, totals).rows(model)
     if scene is not None:
         yield scene.row(judging, model)
     yield from specification_rows(judging, analysis)

@@ -190,9 +190,7 @@ class RandomRows:
         mine, theirs = self._effects(model), self._effects(other_model)
         judged_by_mine, judged_by_theirs = mine, theirs
         if self.mission.requirements.has_confidence:
-            judged_by_mine, judged_by_theirs = (
-                self._effects(name, is_judged=True) for name in (model, other_model)
-            )
+            judged_by_mine, judged_by_theirs = (self._effects(name, is_judged=True) for name in (model, other_model))
         sizes = self._sizes(model, mine, judged_by_mine)
         sizes_of_other = self._sizes(other_model, theirs, judged_by_theirs)
         declared = self._table([math.nan if error.declared is None else error.declared for error in self.errors])

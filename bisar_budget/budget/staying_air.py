@@ -242,7 +242,9 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> PerCa
     takes autofocus into account. The displacement is only the part that is added by the change of the delay. It is
     the square root of the squared displacement with the change minus the squared displacement without the change.
     """
-    effect = error.judged_effect(model, analysis.mission.requirements.confidence_of, analysis.allocation.autofocus_gain)
+    effect = error.judged_effect(
+        model, analysis.mission.requirements.confidence_of, analysis.allocation.autofocus_gain
+    )
     judged_effect = judged_effect_of(analysis.mission, error, model, analysis.allocation.autofocus_gain)
     if key == LOCATION:
         stays = next(declared_error for declared_error in analysis.random if declared_error.id == error.id).effect(

@@ -840,7 +840,7 @@ class DeclaredErrors:
     def judged_size(self, error: ErrorSource, requirement: str) -> Floats:
         """Size of a declared error that a requirement judges, (cases,), in the unit of the error."""
         block, index = self.block_of(error)
-        return block.judged_sizes(requirement)[index]
+        return np.asarray(block.judged_sizes(requirement)[index])
 
     def at_rms(self, model: str, error: ErrorSource) -> Declared | None:
         """Effects of the root mean square of a declared error, without the coverage factor, in arrays (cases,).

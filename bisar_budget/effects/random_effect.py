@@ -233,9 +233,7 @@ class RandomError(NamedTuple):
         """Effect of one unit of the error in the model with the given name, `full` or `published`."""
         return self.full if model == "full" else self.published
 
-    def judged_effect(
-        self, model: str, confidence_of: Callable[[str], float | None], gain: PerCase
-    ) -> RandomEffect:
+    def judged_effect(self, model: str, confidence_of: Callable[[str], float | None], gain: PerCase) -> RandomEffect:
         """Effect of one unit of the error as the requirements judge it: each phase and displacement at its quantile.
 
         Without a confidence it is the effect at one sigma. `confidence_of` gives the confidence of a requirement, and

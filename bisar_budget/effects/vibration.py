@@ -372,7 +372,8 @@ class DeclaredPhase(NamedTuple):
     @property
     def expected_cubic_rad(self) -> PerCase:
         """Root mean square of the cubic phase, with the sign of the cubic phase. [rad]"""
-        return self.cubic_rad / self.coverage if self.rms_cubic_rad is None else self.rms_cubic_rad
+        phase: PerCase = self.cubic_rad / self.coverage if self.rms_cubic_rad is None else self.rms_cubic_rad
+        return phase
 
     def judged(self, gain: PerCase) -> PerCase:
         """Phase to compare with a limit that has been raised by the autofocus gain; see `Declared.judged`. [rad]

@@ -1,0 +1,244 @@
+"""Distributions of the effects of all declared errors together, and their quantiles.
+
+An effect is what a requirement limits: the quadratic phase with its hidden parts, the cubic phase, or the displacement
+of the image on the ground. Each declared error contributes one or more independent random vectors (see `variables`),
+and a bias contributes a constant. A requirement with a confidence p judges the p-quantile of the length of their sum.
+A requirement without a confidence judges the length of the sum of the biases, plus k times the root-sum-square of the
+random parts, where k is the coverage factor.
+
+The vectors are first-order effects. The vector of an error whose effects are not proportional to its size is scaled to
+the effect of its judged size, computed from exact ranges.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.variables import CUBIC as CUBIC_INDEX
+from bisar_budget.analysis.variables import EAST, FIRST_HIDDEN, NORTH, ErrorVariables, Variable
+from bisar_budget.analysis.variables import QUADRATIC as QUADRATIC_INDEX
+from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC
+from bisar_budget.effects.effect import ErrorSource, plain
+from bisar_budget.random_vector import RandomVector
+
+PERCENTILES = (0.5, 0.68, 0.9, 0.95, 0.997)  # probabilities that every report states
+
+_UNIFORM_WIDTH = math.sqrt(3)  # largest value of a uniform variable of variance 1
+IsMember = Callable[[str], bool]
+"""Whether the errors of an owner, such as `receiver`, are part of a sum."""
+
+
+class Totals:
+    """Distributions of the sums of all declared errors of an analysis, in each of its cases and in both models."""
+
+    def __init__(self, analysis: Analysis) -> None:
+        self.analysis, self.errors = analysis, analysis.errors
+        self._variables: dict[tuple[str, int], list[Variable]] = {}
+        self._biases: dict[tuple[str, int], dict[str, tuple[float, ...]]] = {}
+
+    @cached_property
+    def _listing(self) -> ErrorVariables:
+        return ErrorVariables(self.analysis)
+
+    @cached_property
+    def is_biased(self) -> bool:
+        """Whether any declared error has a bias."""
+        return any(np.any(source.bias) for source in self.errors.stated)
+
+    def is_asked(self, requirement: str) -> bool:
+        """Whether a requirement judges anything but the declared sizes: a confidence, or biases."""
+        return self.is_biased or self.errors.confidence(requirement) is not None
+
+    # ---------------------------------------------------------------- distributions
+    def vector(
+        self, model: str, requirement: str, is_member: IsMember, case: int, gain: PerCase = 1.0
+    ) -> RandomVector:
+        """Random vector whose length is the effect that a requirement limits, due to the errors of some owners.
+
+        Parameters
+        ----------
+        model : str
+            `published` or `full`.
+        requirement : str
+            `quadratic_phase_error` [rad], `cubic_phase_error` [rad] or `location_error` [m].
+        is_member : callable
+            Whether the errors of an owner are part of the sum.
+        case : int
+            Index of the case.
+        gain : float or (cases,)
+            Gain of autofocus, which multiplies the hidden phase; see `Declared.judged`.
+        """
+        variables = [each for each in self._of(model, case) if is_member(each.owner)]
+        owners = {source.id: source.owner for source in self.errors.stated}
+        biases = [effects for row_id, effects in self._biases_of(model, case).items() if is_member(owners[row_id])]
+        lengths = [len(effects) for effects in (*biases, *(each.effects for each in variables))]
+        columns, weights = _columns(requirement, max(lengths, default=FIRST_HIDDEN), plain(gain, case))
+        parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": []}
+        for variable in variables:
+            vector = (
+                _taken(variable.effects, columns) * weights * self._scale(model, requirement, variable, case, gain)
+            )
+            if variable.distribution == "tone":
+                parts["tone"].append(np.array((vector, _taken(variable.quadrature, columns) * weights)))
+            elif variable.distribution == "uniform":
+                parts["uniform"].append(vector * _UNIFORM_WIDTH)
+            else:
+                parts[variable.distribution].append(vector)
+        mean = sum((_taken(effects, columns) * weights for effects in biases), np.zeros(len(columns)))
+        shapes = {"tone": (-1, 2, len(columns))}
+        arrays = {
+            name: np.array(vectors, dtype=float).reshape(shapes.get(name, (-1, len(columns))))
+            for name, vectors in parts.items()
+        }
+        return RandomVector(mean, **arrays)
+
+    def reached(
+        self, model: str, requirement: str, is_member: IsMember, root_sum_square: Floats, gain: PerCase = 1.0
+    ) -> Floats:
+        """Size that a requirement judges for the sum of the errors of some owners, (cases,), in its unit.
+
+        The parameters are those of `vector`. `root_sum_square` (cases,) is the size without biases and a confidence.
+        The result is infinite or NaN in the cases in which this size is, because an error leaves no image.
+        """
+        if not self.is_asked(requirement):
+            return root_sum_square
+        confidence, reached = self.errors.confidence(requirement), np.array(root_sum_square, dtype=float)
+        for case in np.flatnonzero(np.isfinite(reached)):
+            vector = self.vector(model, requirement, is_member, int(case), gain)
+            if confidence is None:
+                reached[case] += np.linalg.norm(vector.mean)
+            else:
+                (reached[case],) = vector.quantiles((confidence,))
+        return reached
+
+    def percentiles(self, model: str, requirement: str, case: int, way: Floats | None = None) -> list[float]:
+        """Sizes that the effect of all errors does not exceed with each probability of `PERCENTILES`.
+
+        `way` (2,) is a unit vector on the ground; if it is given, they are of the displacement along it.
+        """
+        vector = self.vector(model, requirement, lambda owner: True, case)
+        if way is not None:
+            vector = RandomVector(*(part @ np.asarray(way)[:, None] for part in vector))
+        return vector.quantiles(PERCENTILES)
+
+    def probability(self, model: str, requirement: str, limit: float, case: int) -> float:
+        """Probability that the effect of all errors, drawn together, keeps a limit, in the unit of the requirement."""
+        return self.vector(model, requirement, lambda owner: True, case).probability(limit)
+
+    # ---------------------------------------------------------------- variables of a model
+    def _of(self, model: str, case: int) -> list[Variable]:
+        if (model, case) not in self._variables:
+            variables = self._listing.of(case)
+            if model == "published":
+                variables = self._published(variables, case)
+            self._variables[model, case] = variables
+        return self._variables[model, case]
+
+    def _biases_of(self, model: str, case: int) -> dict[str, tuple[float, ...]]:
+        if (model, case) not in self._biases:
+            biases = self._listing.biases(case) if self.is_biased else {}
+            if model == "published":
+                sources = {source.id: source.in_one_case(case) for source in self.errors.stated}
+                biases = {
+                    row_id: self._published_effects([(sources[row_id], sources[row_id].bias)], case)
+                    for row_id in biases
+                }
+            self._biases[model, case] = biases
+        return self._biases[model, case]
+
+    def _published(self, variables: Sequence[Variable], case: int) -> list[Variable]:
+        """Replace the effects of variables by those of the published model, which hides no phase.
+
+        The published model has only the sigmas of random errors. Their effects are independent there.
+        """
+        published = [
+            each._replace(effects=self._published_effects(each.parts, case)) for each in variables if each.parts
+        ]
+        for error in self.analysis.random:
+            if error.declared is None or error.counted_in:
+                continue
+            effect, size = error.published.of(case), plain(error.declared, case)
+            size /= plain(error.coverage(self.analysis.mission), case)
+            distribution = "normal" if error.is_covered else "bound"
+            for index, sigma in enumerate((effect.quadratic, effect.cubic, effect.east, effect.north)):
+                if sigma and math.isfinite(sigma):
+                    effects = tuple(sigma * size if place == index else 0.0 for place in range(FIRST_HIDDEN))
+                    published.append(
+                        Variable(f"{error.id}.{index}", error.id, error.owner, distribution, (), effects)
+                    )
+        moved = {tone.subject.id: tone for tone in self.analysis.displacing_tones}
+        seen = set[str]()
+        for each in variables:
+            if each.distribution != "tone":
+                continue
+            effects, quadrature = each.effects[:EAST], each.quadrature[:EAST]
+            published.append(each._replace(effects=(*effects, 0.0, 0.0), quadrature=(*quadrature, 0.0, 0.0)))
+            seen.add(each.of)
+        for row_id, tone in moved.items():
+            for index, part in enumerate(tone.published):
+                constant, linear, quadratic, cubic = np.nan_to_num(part.orders[:, None] * part.per_metre)[
+                    ..., case if part.orders.shape[-1] > 1 else 0
+                ]
+                ahead, behind = constant - quadratic, linear - cubic
+                published.append(
+                    Variable(
+                        f"{row_id}.published{index}",
+                        row_id,
+                        tone.subject.owner,
+                        "tone",
+                        (),
+                        (0.0, 0.0, *ahead.tolist()),
+                        (0.0, 0.0, *behind.tolist()),
+                    )
+                )
+        return published
+
+    def _published_effects(self, parts: Sequence[tuple[ErrorSource, float]], case: int) -> tuple[float, ...]:
+        plane = self.errors.planes["published"]
+        effects = np.zeros(FIRST_HIDDEN)
+        for source, size in parts:
+            moved = (
+                [plain(each, case) for each in plane.displacement(source.effect, size)] if source.is_motion else []
+            )
+            effects += (
+                source.effect.qpe * size,
+                source.effect.cubic * size,
+                *(np.nan_to_num(moved) if moved else (0.0, 0.0)),
+            )
+        return tuple(effects.tolist())
+
+    def _scale(self, model: str, requirement: str, variable: Variable, case: int, gain: PerCase) -> float:
+        """Ratio of the exact effect of an error at its judged size to its first-order effect; 1 for small errors."""
+        if model == "published" or len(variable.parts) != 1:
+            return 1.0
+        ((source, _),) = variable.parts
+        stated = next(each for each in self.errors.stated if each.id == source.id)
+        if not self.errors.is_large(stated)[case]:
+            return 1.0
+        block, index = self.errors.block_of(stated)
+        exact = self.errors.judged("full", stated).in_one_case(case)
+        size = abs(plain(block.judged_sizes(requirement)[index], case))
+        per_unit = plain(block.per_unit("full")[LIMITING_REQUIREMENTS.index(requirement), index], case)
+        moved = 0.0 if exact.farthest is None else math.hypot(*exact.farthest)
+        effect = {QUADRATIC: exact.judged(plain(gain, case)), CUBIC: abs(exact.cubic), LOCATION: moved}[requirement]
+        first_order = per_unit * size
+        return float(effect / first_order) if first_order and math.isfinite(effect) else 1.0
+
+
+def _columns(requirement: str, count: int, gain: float) -> tuple[list[int], Floats]:
+    """Indices of the effects whose length a requirement limits, and the factors of these effects."""
+    if requirement == LOCATION:
+        return [EAST, NORTH], np.ones(2)
+    if requirement == CUBIC:
+        return [CUBIC_INDEX], np.ones(1)
+    hidden = list(range(FIRST_HIDDEN, count))
+    return [QUADRATIC_INDEX, *hidden], np.array([1.0, *(gain for _ in hidden)])
+
+
+def _taken(effects: Sequence[float], columns: Sequence[int]) -> Floats:
+    """Select effects; those that a variable does not have are 0."""
+    return np.array([effects[column] if column < len(effects) else 0.0 for column in columns])
