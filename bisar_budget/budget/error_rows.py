@@ -152,7 +152,8 @@ class ErrorRow(FamilyRow):
         notes, fields = source.notes, dict[str, Any]()
         equal_loss = 0.0
         if source.declared is not None:
-            fields = {"displacement_m": case.does(model, source).displacement}
+            bias = case.number(source.bias)
+            fields = {"displacement_m": case.does(model, source).displacement, "bias": bias or None}
             mine = case.judged(model, source)
             equal_loss = float(mine.equal_loss)
             if mine.displacement is None and source.is_motion:

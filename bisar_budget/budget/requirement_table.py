@@ -12,7 +12,9 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
+from bisar_budget.analysis.totals import PERCENTILES
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
+from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import PULL_IN
 from bisar_budget.budget.declarations import (
     DECLARATIONS,
@@ -32,7 +34,7 @@ from bisar_budget.budget.judged_requirements import (
 )
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
-from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
+from bisar_budget.effects.declared import LIMITING_REQUIREMENTS, LOCATION, MODELS, QUADRATIC
 from bisar_budget.error_kinds.registry import kind_of
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
@@ -192,6 +194,7 @@ def _entry(
         reason = decider.reason
     judges = [row for row, does_judge in zip(rows, state.judges[:, case.place], strict=True) if row and does_judge]
     path = ("requirements", key)
+    distribution = _distribution(key, judged, case) if not is_open and key in LIMITING_REQUIREMENTS else {}
     return JudgedRequirement(
         key=key,
         value=value,
@@ -211,7 +214,39 @@ def _entry(
         autofocus_gain=case.allocation.autofocus_gain if key == QUADRATIC else None,
         use_row=None if user is None or use is None else user.id,
         requirement_ids=mission.requirement_ids.get(id_of_requirement(key), ()),
+        confidence=mission.requirements.confidence_of(key),
+        **distribution,
     )
+
+
+def _distribution(key: str, judged: JudgedMission, case: Case) -> dict[str, Any]:
+    """Return the fields of a requirement that describe the distribution of the quantity that it limits.
+
+    It is the distribution by the gating model, of all declared errors together, whatever the mission's rule. The
+    result is empty if no image forms with an error of the declared size, or if no error is declared.
+    """
+    model, totals = next(iter(judged.families)), judged.totals
+    together = judged.analysis.together(model)
+    if not (together.phases or together.is_placed):
+        return {}
+    of_all = together.moved("rss") if key == LOCATION else together.judged(together.phases, "rss")
+    if not math.isfinite(case.number(of_all)):
+        return {}
+    names = [f"{100 * confidence:g}" for confidence in PERCENTILES]
+
+    def percentiles(way: Floats | None = None) -> dict[str, float]:
+        return dict(zip(names, totals.percentiles(model, key, case.place, way), strict=True))
+
+    limit = getattr(case.mission.requirements, key)
+    fields: dict[str, Any] = {"percentiles": percentiles()}
+    if limit is not None:
+        fields["probability"] = totals.probability(model, key, limit, case.place)
+    if key == LOCATION:
+        east, north = (case.number(component) for component in case.geometry.range_gradient)
+        along = np.array((east, north)) / math.hypot(east, north)
+        across = np.array((-along[1], along[0]))
+        fields |= {"percentiles_range": percentiles(along), "percentiles_azimuth": percentiles(across)}
+    return fields
 
 
 def _waivers(

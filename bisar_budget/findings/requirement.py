@@ -3,6 +3,7 @@
 For each requirement it has the limit, the value that the mission reaches, and the row that decides the status.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,6 +51,13 @@ class JudgedRequirement(NamedTuple):
     judged, or why it is not met. `waivers` are the waivers that cover the requirement or its rows; empty unless the
     requirement is waived. `is_unjudged` tells whether it cannot be judged, even if it is waived. `requirement_ids`
     are the ids that the project gives to the requirement.
+
+    `confidence` is the probability with which the file asks for the limit; None without one. `probability` is the
+    probability that all declared errors, drawn together, keep the limit. `percentiles` are the sizes of the limited
+    quantity that they do not exceed with a probability: of a location error, the length of the displacement, and
+    `percentiles_range` and `percentiles_azimuth` its magnitude along the range gradient on the ground, and across it.
+    The keys are probabilities in percent. They are None for levels, which are expectations, and where errors are so
+    large that there is no image, or displace the image by an unknown amount.
     """
 
     key: str
@@ -70,6 +78,11 @@ class JudgedRequirement(NamedTuple):
     autofocus_gain: float | None = None
     use_row: str | None = None
     requirement_ids: tuple[str, ...] = ()
+    confidence: float | None = None
+    probability: float | None = None
+    percentiles: Mapping[str, float] | None = None
+    percentiles_range: Mapping[str, float] | None = None
+    percentiles_azimuth: Mapping[str, float] | None = None
 
     def __repr__(self) -> str:
         """Show the key, the reached and the allowed value, and the status of the requirement on one line."""

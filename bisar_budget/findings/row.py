@@ -77,6 +77,7 @@ class Row(NamedTuple):
     for any displacement of the image, because of the finite bandwidth and the turn of the line of sight. `rest_rad`
     is the rms phase beyond the cubic order. `model` is the model that gives these numbers. `waivers` are the waivers,
     valid or expired, that name the row while it fails. `refuted` names the images that refute the limit of the row.
+    `bias` is the known, constant part of the error, signed and in its unit, beside the random part `declared`.
     `navigation` has the errors at mid-aperture if the row is that of an aided navigation. `requirement_ids` are the
     ids that the project gives to the row.
     """
@@ -113,6 +114,7 @@ class Row(NamedTuple):
     refuted: tuple[Note, ...] = ()
     navigation: NavigationState | None = None
     is_unjudged: bool = False  # the row cannot be judged, waived or not
+    bias: float | None = None
 
     def __repr__(self) -> str:
         """Show the id, the declared and the allowed size, and the status of the row on one line."""

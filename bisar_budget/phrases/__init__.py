@@ -51,6 +51,7 @@ from bisar_budget.phrases.requirement_sentences import (
     effect_is_not_judged,
     not_declared_as_required,
     nothing_judges,
+    stated_confidence,
     waived,
 )
 from bisar_budget.phrases.scene_sentences import SCENE_SENTENCES
@@ -118,6 +119,7 @@ __all__ = (
     "sigma_of_time_series",
     "slower_than_three_cycles",
     "spectrum_shakes",
+    "stated_confidence",
     "waived",
 )
 

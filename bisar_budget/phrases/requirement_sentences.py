@@ -1,6 +1,6 @@
 """Sentences about requirements, declarations, specifications and waivers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 
 from bisar_budget.phrases.notes import composed
@@ -42,6 +42,28 @@ def effect_words(effect_name: str, size: float) -> str:
 @composed
 def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
     """Text after `met` that states the confidence of a verdict: 1 sigma or coverage factor, and stated bounds."""
+    return _of_sizes(coverage_factor, has_sigma=has_sigma, has_bounds=has_bounds)
+
+
+@composed
+def stated_confidence(confidences: Mapping[str, float], of_others: str) -> str:
+    """Text after `met` that states the confidence of a verdict if requirements state confidences.
+
+    `confidences` are the confidences by the names of the requirements. `of_others` is the confidence that the
+    declared sizes give to other requirements on phases and the location; empty if there are none.
+    """
+    levels = set(confidences.values())
+    if len(levels) == 1 and not of_others:
+        return f"with {_percent(levels.pop())} confidence"
+    stated = [f"with {_percent(level)} confidence ({name})" for name, level in confidences.items()]
+    return ", ".join([*stated, *([f"else {of_others}"] if of_others else [])])
+
+
+def _percent(probability: float) -> str:
+    return f"{100 * probability:.8g} %"
+
+
+def _of_sizes(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
     covered = f"with coverage factor {coverage_factor:g}"
     if not has_sigma:
         if not has_bounds:

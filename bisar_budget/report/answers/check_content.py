@@ -198,6 +198,7 @@ def _row(row: Row) -> dict[str, object]:
         "reason_code": None if row.reason is None else row.reason.code,
         "note_codes": [note.code for note in notes],
         "requirement_ids": row.requirement_ids,
+        "bias": row.bias,
     }
     return item if row.navigation is None else item | {"navigation": row.navigation._asdict()}
 

@@ -120,9 +120,28 @@ def confidence_words(mission: MissionFindings) -> str:
     The text is empty if a requirement is not met.
     """
     status = STATUS[mission.status]
-    return f" {mission.confidence}" if status.is_held and not status.fails else ""
+    return f" {mission.confidence}{collections_words(mission)}" if status.is_held and not status.fails else ""
 
 
+def collections_words(mission: MissionFindings) -> str:
+    """Text after the confidence with the fraction of collections that keep each limit; it begins with a comma.
+
+    It is that of the requirement that the fewest collections keep. The text is empty if every requirement on a phase
+    or the location states a confidence of its own, or if all collections keep all of them.
+    """
+    kept = [each.probability for each in mission.requirements if each.confidence is None]
+    least = min((probability for probability in kept if probability is not None), default=1.0)
+    return f", {share_of_collections(least)} of collections" if least < 1 else ""
+
+
+def share_of_collections(probability: float) -> str:
+    """Probability in percent, rounded down, so that no limit is said to be kept more often than it is."""
+    if probability >= _NEARLY_ALL_PROBABILITY:
+        return "more than 99.99 %"
+    return f"{math.floor(1000 * probability + 1e-9) / 10:g} %"
+
+
+_NEARLY_ALL_PROBABILITY = 0.9999
 _HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error")  # levels are mean powers
 
 
@@ -138,13 +157,22 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
     status = STATUS[requirement.status]
     text += f": {status.words}"
     if status.is_held and not status.fails and requirement.key in _HAS_CONFIDENCE:
-        text += f" {mission.confidence}"
+        text += f" {_confidence_of(requirement, mission)}"
     if requirement.reached is not None:
         text += f", {requirement_size(requirement.reached, requirement)} reached"
     if requirement.row is not None and not requirement.is_unjudged:
         text += f", decided by {requirement.row}"
     text += "".join(f", {remark}" for remark in use_remarks(requirement))
     return "; ".join([text, *filter(None, [requirement.reason]), *(waiver.words for waiver in requirement.waivers)])
+
+
+def _confidence_of(requirement: JudgedRequirement, mission: MissionFindings) -> str:
+    """Confidence at which a mission meets a requirement, in words."""
+    if requirement.confidence is not None:
+        return f"with {100 * requirement.confidence:.8g} % confidence"
+    if requirement.probability is None or requirement.probability == 1:
+        return str(mission.confidence)
+    return f"{mission.confidence}, {share_of_collections(requirement.probability)} of collections"
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
@@ -201,7 +229,9 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
     """Verdict on a mission that breaks no requirement. Waivers, warnings or autofocus are mentioned."""
-    text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
+    text = (
+        ", ".join(waived) or f"every requirement is judged and met {mission.confidence}{collections_words(mission)}"
+    )
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
     return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text
