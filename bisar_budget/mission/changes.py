@@ -359,6 +359,7 @@ _NO_SIZES = (
     "averaging",
     "bandwidth",
     "before",
+    "bias",
     "correlation_time",
     "frequency",
     "from",
@@ -378,7 +379,8 @@ def is_error(key: str) -> bool:
     In the sections that declare errors, every key states a size, except for keys such as intervals and frequencies.
     """
     steps = parts_of(key)
-    return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES
+    is_bias = any(step == "bias" for step in steps)
+    return any(step in _ERROR_KEYS for step in steps[:3]) and steps[-1] not in _NO_SIZES and not is_bias
 
 
 def name_of_error(key: str) -> str:

@@ -31,14 +31,17 @@ from bisar_budget.mission.changes import (
 from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.model import MISSION, Mission, Simulation
+from bisar_budget.mission.model import MISSION, Mission, Requirements, Simulation, TimingError
 from bisar_budget.mission.navigation import OUTAGE_KEYS
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
 from bisar_budget.mission.readers import (
+    BIAS_FIELD,
+    CONFIDENCE_FIELD,
     DIRECTION,
     ELEVATION,
     INVALID,
     LATITUDE,
+    SIZE_FIELD,
     ListOf,
     OneOf,
     Quantity,
@@ -381,6 +384,9 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 }
 
 
+_WITH_PAIRS = (MotionError, CommonMotionError, TimingError, Requirements)
+
+
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
     """Return a mission in which the value of a key is replaced by a number, or by an array (cases,)."""
     changed_mission: Mission = _with_value(mission, parts_of(key), number)
@@ -397,6 +403,12 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
     if isinstance(value, Covariance):
         return _with_element(value, steps, number)
     name, *remaining = steps
+    if remaining and remaining[0] in (SIZE_FIELD, "limit") and isinstance(value, _WITH_PAIRS):
+        remaining = remaining[1:]  # the section keeps the size under the key itself
+    elif remaining and remaining[0] == BIAS_FIELD and isinstance(value, _WITH_PAIRS):
+        bias = value.bias.get(name)
+        changed_bias = _with_value(() if bias is None and name in _TRIPLES else bias, remaining[1:], number)
+        return value._replace(bias={**value.bias, name: changed_bias})
     if name.isdigit():
         index = int(name)
         return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
@@ -464,6 +476,14 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
     if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
+    if remaining and isinstance(value, _WITH_PAIRS):
+        first, *further = remaining
+        if first in (SIZE_FIELD, "limit"):
+            return _value_below(getattr(value, name), further)
+        if first == BIAS_FIELD:
+            return _value_below(value.bias.get(name), further)
+        if first == CONFIDENCE_FIELD:
+            return value.confidence_of(name)
     if isinstance(value, MotionError) and name in _STATE_NAMES:
         return _value_below(value.stated(name), remaining)
     return _value_below(getattr(value, _FIELDS_BY_KEY.get(name, name)), remaining)

@@ -156,6 +156,9 @@ _LEVEL = {f"{VIBRATION}spectrum": SPECTRUM}
 _FELT_TONE = {**SENSITIVE, f"{OSCILLATOR}vibration.sinusoidal.0.frequency": "15 Hz"}
 _FELT_SPECTRUM = {**SENSITIVE, f"{OSCILLATOR}vibration.spectrum": SPECTRUM}
 
+_SMALL_SIZES = {"position": "1 mm", "velocity": "0.1 mm/s", "acceleration": "0.01 mm/s^2", "time_tag": "1 us"}
+_SMALL_TERMS = {"constant": "0.1 ns", "linear": 1e-12, "quadratic": "1e-13 1/s", "cubic": "1e-14 1/s^2"}
+
 ERROR_KEYS: dict[str, ErrorKey] = {
     "scene.height_error": ErrorKey("3 m", "6 m", "mission.terrain"),
     f"{ERROR}position": ErrorKey(["1 m", 0, 0], ["2 m", 0, 0], "receiver.position.x"),
@@ -350,13 +353,25 @@ ERROR_KEYS: dict[str, ErrorKey] = {
     "other_errors.islr": ErrorKey("-30 dB", "-20 dB", "other.antenna.islr", ANTENNA, "other_errors"),
     REGISTERED: ErrorKey("5 cm/s", "10 cm/s", f"receiver.{REGISTERED_KIND.name}"),
 }
+# Figures whose size and bias stand in a section of their own, and a size beside which the bias has an effect.
+for _key, _small in (
+    *((f"{_section}{_figure}", _size) for _section in (ERROR, COMMON) for _figure, _size in _SMALL_SIZES.items()),
+    *((f"timing_error.{_term}", _size) for _term, _size in _SMALL_TERMS.items()),
+):
+    _alone = ERROR_KEYS[_key]
+    ERROR_KEYS[f"{_key}.sigma"] = _alone._replace(absent=_key)
+    ERROR_KEYS[f"{_key}.bias"] = _alone._replace(beside={f"{_key}.sigma": _small})
 
 # Keys that describe an error: which of them changes nothing that is computed is said beside it.
 _VELOCITY = {f"{ERROR}velocity": ["5 cm/s", 0, 0]}
 _SHARED = {f"{COMMON}velocity": ["5 cm/s", 0, 0]}
+_MOVED_KINDS = ("position", "velocity", "acceleration")
+_MOVED = {f"{ERROR}position": ["1 m", 0, 0], f"{ERROR}acceleration": ["3 mm/s^2", 0, 0], **_VELOCITY}
 DESCRIBING_KEYS: dict[str, tuple[Document, Any, Any]] = {
     f"{ERROR}frame": (_VELOCITY, "track", None),
     f"{ERROR}distribution": (_VELOCITY, "uniform", None),
+    **{f"{ERROR}distribution.{kind}": (_MOVED, "uniform", None) for kind in _MOVED_KINDS},
+    **{f"{COMMON}distribution.{kind}": (_SHARED, "uniform", None) for kind in _MOVED_KINDS},
     f"{ERROR}source": (_VELOCITY, "report", None),
     f"{ERROR}random.name": ({f"{ERROR}random.0": {"sigma": "3 mm", "correlation_time": "1.5 s"}}, "GNSS", "RTK"),
     f"{ERROR}random.source": (

@@ -15,17 +15,18 @@ from bisar_budget.error_kinds.path_kinds import STATE_KINDS, StateKind
 from bisar_budget.error_kinds.registry import names_of_named_kinds
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES, JudgedRequirement
+from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import OF_MISSION, Mission, Requirements, Waiver
+from bisar_budget.mission.model import OF_MISSION, Mission, Waiver
 from bisar_budget.mission.parts import figure_text
 from bisar_budget.mission.readers import SectionValue
 from bisar_budget.report.change.fallen_effects import fallen_effects
 from bisar_budget.report.change.lost_doubts import lost_doubts
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
+from bisar_budget.units import format_quantity
 
 
 # ---------------------------------------------------------------------- inputs
@@ -132,6 +133,7 @@ def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None
 # Rules in the order of their strictness, the strictest last.
 _RULES_BY_STRICTNESS = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
+_LIMITS = tuple(key for key in REQUIREMENT_NAMES if key != DECLARE)  # requirements with a size
 _WIDEST_FIRST = ("normal", "bound", "uniform")
 _LIMITING_NUMBERS = (
     ("autofocus", "n_pull", 1),
@@ -169,6 +171,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from gone_errors
     yield from _distributions(*missions)
     yield from _fallen(before, after, [error.id for error in gone_errors])
+    yield from _smaller_biases(before, after)
     yield from (Loosened(*doubt) for doubt in lost_doubts(*missions))
     yield from _sources(before, after)
 
@@ -182,12 +185,30 @@ def loosened_settings(before: Mapping[str, object], after: Mapping[str, object])
 
 
 def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Yield the requirements that were removed or now have a larger value."""
-    for key in Requirements._fields:
+    """Yield the requirements that were removed, or now have a larger value or a smaller confidence."""
+    for key in _LIMITS:
+        path = ("requirements", key)
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
-        if key not in ("declare", "file") and old is not None and (new is None or _is_above(new, old)):
-            path = ("requirements", key)
+        if old is not None and (new is None or _is_above(new, old)):
             yield Loosened(dotted(path), _value_text(before, path, old), _value_text(after, path, new))
+        was, became = (mission.requirements.confidence_of(key) for mission in (before, after))
+        if was is not None and new is not None and (became is None or became < was):
+            yield Loosened(f"{dotted(path)}.confidence", f"{100 * was:g} %", _percent_or_none(became))
+
+
+def _percent_or_none(confidence: float | None) -> str:
+    return "none" if confidence is None else f"{100 * confidence:g} %"
+
+
+def _smaller_biases(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Yield the rows of errors that are still declared, and whose bias became smaller."""
+    new = {row.id: row for row in after.rows if row.declared is not None}
+    for row in before.rows:
+        if row.bias is not None and row.is_independent and row.id in new:
+            bias = new[row.id].bias or 0.0
+            if _is_above(abs(row.bias), abs(bias)):
+                words = (format_quantity(size, row.unit) for size in (row.bias, bias))
+                yield Loosened(f"{row.id}.bias", *words)
 
 
 def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened]:
