@@ -384,7 +384,8 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 }
 
 
-_WITH_PAIRS = (MotionError, CommonMotionError, TimingError, Requirements)
+_WITH_BIASES = (MotionError, CommonMotionError, TimingError)
+_PLAIN_FIELDS = (SIZE_FIELD, "limit")  # of pairs of a number and its bias or confidence
 
 
 def with_number(mission: Mission, key: str, number: SectionValue) -> Mission:
@@ -403,9 +404,9 @@ def _with_value(value: SectionValue, steps: Sequence[str], number: SectionValue)
     if isinstance(value, Covariance):
         return _with_element(value, steps, number)
     name, *remaining = steps
-    if remaining and remaining[0] in (SIZE_FIELD, "limit") and isinstance(value, _WITH_PAIRS):
+    if remaining and remaining[0] in _PLAIN_FIELDS and isinstance(value, (*_WITH_BIASES, Requirements)):
         remaining = remaining[1:]  # the section keeps the size under the key itself
-    elif remaining and remaining[0] == BIAS_FIELD and isinstance(value, _WITH_PAIRS):
+    elif remaining and remaining[0] == BIAS_FIELD and isinstance(value, _WITH_BIASES):
         bias = value.bias.get(name)
         changed_bias = _with_value(() if bias is None and name in _TRIPLES else bias, remaining[1:], number)
         return value._replace(bias={**value.bias, name: changed_bias})
@@ -476,14 +477,13 @@ def _value_below(value: SectionValue, steps: Sequence[str]) -> SectionValue:
         return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
     if name in _CURVE_ABSCISSAS:
         return _point(getattr(value, name), name, ".".join(remaining))
-    if remaining and isinstance(value, _WITH_PAIRS):
-        first, *further = remaining
-        if first in (SIZE_FIELD, "limit"):
-            return _value_below(getattr(value, name), further)
-        if first == BIAS_FIELD:
-            return _value_below(value.bias.get(name), further)
-        if first == CONFIDENCE_FIELD:
-            return value.confidence_of(name)
+    first, *further = remaining or ("",)
+    if isinstance(value, Requirements) and first == CONFIDENCE_FIELD:
+        return value.confidence_of(name)
+    if isinstance(value, _WITH_BIASES) and first == BIAS_FIELD:
+        return _value_below(value.bias.get(name), further)
+    if isinstance(value, (*_WITH_BIASES, Requirements)) and first in _PLAIN_FIELDS:
+        remaining = further
     if isinstance(value, MotionError) and name in _STATE_NAMES:
         return _value_below(value.stated(name), remaining)
     return _value_below(getattr(value, _FIELDS_BY_KEY.get(name, name)), remaining)

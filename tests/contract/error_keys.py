@@ -503,5 +503,7 @@ def keys_below(node: Any, path: str, schema: Document) -> Iterator[str]:
     if not sections:
         yield path
     for section in sections:
+        if {"sigma", "bias"} <= section["properties"].keys() or path.endswith("distribution"):
+            yield path  # may be a size or a word too
         for key, value in section["properties"].items():
             yield from keys_below(value, f"{path}.{key}", schema)
