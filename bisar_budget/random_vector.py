@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.arrays import Floats
+from bisar_budget.arrays import Complexes, Floats
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 
 _SMALL_CONTRIBUTION_FRACTION = 1e-4  # of the longest contribution; a shorter one is taken for a normal one
@@ -50,10 +50,13 @@ _EXACT_TOLERANCE_FRACTION = 1e-11
 _BESSEL_TABLE_END_RAD, _BESSEL_STEPS_PER_RAD = 32, 64
 # Found component by component for 2¹⁴ points, least mean square error with product weights 0.25·0.93ʲ (Cools, Kuo &
 # Nuyens), and for 2¹⁷ points in the first ten.
-_LATTICE_GENERATOR = """
-1 27923 15321 20807 91029 90835 15835 29673 90157 117445 12455 5887 16221 10455 5737 8549 10589 11231 14759 13805 525
-1501 6867 4401 8633 647 14495 8767 13861 4139 8613 7405 1909 381 7035 7091 16039 4933 15589 4535
-""".split()
+# fmt: off
+_LATTICE_GENERATOR = (
+    1, 27923, 15321, 20807, 91029, 90835, 15835, 29673, 90157, 117445, 12455, 5887, 16221, 10455, 5737, 8549, 10589,
+    11231, 14759, 13805, 525, 1501, 6867, 4401, 8633, 647, 14495, 8767, 13861, 4139, 8613, 7405, 1909, 381, 7035,
+    7091, 16039, 4933, 15589, 4535,
+)
+# fmt: on
 
 Probability = Callable[[Floats], Floats]
 """The probability that the length is at most each of the limits (limits,)."""
@@ -284,7 +287,9 @@ def _needs_lattice(vector: _Reduced) -> bool:
     """Whether the probability is integrated over a lattice, with points that depend on the confidence."""
     if _is_enumerated(vector) or _is_normal(vector, 1) or _is_normal(vector, 2):
         return False
-    return len(vector.mean) > 2 or (len(vector.mean) == 2 and _plane_terms(vector) == 0)
+    if len(vector.mean) == 2:
+        return _plane_terms(vector) == 0
+    return len(vector.mean) > 2 and _square_terms(vector) == 0
 
 
 def _distribution(vector: _Reduced, confidence: float) -> Probability:
@@ -293,6 +298,8 @@ def _distribution(vector: _Reduced, confidence: float) -> Probability:
         return _plane_normal(vector)
     if len(vector.mean) == 1 and not _is_enumerated(vector):
         return _line_series(vector)
+    if _square_terms(vector):
+        return _square_series(vector, _square_terms(vector))
     if len(vector.mean) == 2 and not _is_enumerated(vector):
         terms = _plane_terms(vector)
         if terms:
@@ -333,28 +340,35 @@ def _half_normal_score(confidence: float) -> float:
 
 
 def _solve(probability: Probability, confidences: Floats, guesses: Floats, tolerance: float) -> Floats:
-    """Lengths with given probabilities: by the secant through a bracket (Illinois), in the logarithm of the excess.
+    """Lengths with given probabilities: by the secant through a bracket, in the logarithm of the excess.
+
+    An end of the bracket that remains is weighted after Anderson & Björck (BIT 13, 1973).
 
     `tolerance` is the relative tolerance of the length, and of the probability that it is exceeded.
     """
     count = len(guesses)
     low, high, trial, lengths = np.zeros(count), np.full(count, np.inf), guesses.copy(), guesses.copy()
-    excess_low, excess_high = np.full(count, np.inf), np.full(count, -np.inf)
+    excess_low, excess_high, was_below = np.full(count, np.inf), np.full(count, -np.inf), np.full(count, -1)
     slopes, pending = np.maximum(-2.0 * np.log1p(-confidences), 1.0), np.arange(count)  # exact for Rayleigh's law
     for step in range(_MAX_SOLVER_STEPS):
         tried = trial[pending]
         excess = np.log(np.maximum(1.0 - probability(tried), 1e-300) / (1.0 - confidences[pending]))
         is_below = excess > 0.0
         below, above = pending[is_below], pending[~is_below]
-        # The end that remains counts half, so that the secant does not keep it for ever.
-        excess_high[below] *= 0.5
-        excess_low[above] *= 0.5
+        # An end that remains twice counts less, so that the secant does not keep it for ever.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            decrease = 1.0 - excess / np.where(is_below, excess_low[pending], excess_high[pending])
+        decrease = np.where(decrease > 0.0, decrease, 0.5)
+        decrease = np.where(is_below == was_below[pending], decrease, 1.0)
+        excess_high[below] *= decrease[is_below]
+        excess_low[above] *= decrease[~is_below]
         low[below], excess_low[below] = tried[is_below], excess[is_below]
         high[above], excess_high[above] = tried[~is_below], excess[~is_below]
+        was_below[pending] = is_below
         is_exact = np.abs(excess) <= tolerance
         is_done = is_exact | (high[pending] * (1.0 - tolerance) <= low[pending])
         lengths[pending] = np.where(is_exact, tried, np.minimum(high[pending], 1e300))
-        steps = np.exp(np.clip(1.3 * 2.0**step * excess / slopes[pending], -0.7, 0.7))
+        steps = np.exp(np.minimum(np.maximum(1.3 * 2.0**step * excess / slopes[pending], -0.7), 0.7))
         pending, steps = pending[~is_done], steps[~is_done]
         if not len(pending):
             break
@@ -368,12 +382,11 @@ def _next_trial(
 ) -> Floats:
     """Next lengths: `outer` while no bracket exists, otherwise on the secant, or half way if it is flat or steep."""
     is_bracket = np.isfinite(high) & ((low > 0.0) | (step > 20))
-    with np.errstate(invalid="ignore"):
-        fall = excess_low - excess_high
+    fall = excess_low - excess_high
     is_secant = (fall > 0.0) & (fall < 100.0) & (step % 8 != 7)
     share = np.where(is_secant, excess_low, 0.5) / np.where(is_secant, fall, 1.0)
     width = np.where(is_bracket, high, low) - low
-    return np.where(is_bracket, low + np.clip(share, 1e-4, 1.0 - 1e-4) * width, outer)
+    return np.where(is_bracket, low + np.minimum(np.maximum(share, 1e-5), 1.0 - 1e-5) * width, outer)
 
 
 def _plane_normal(vector: _Reduced) -> Probability:
@@ -472,6 +485,52 @@ def _line_series(vector: _Reduced) -> Probability:
     return probability
 
 
+def _square_support(vector: _Reduced) -> float:
+    """Squared length that a normal vector exceeds with a probability of less than 1e-12."""
+    lengths = _lengths(vector.normal)
+    root = math.hypot(*vector.mean.tolist()) + math.hypot(*lengths.tolist()) + _SUPPORT_SIGMA * float(lengths[0])
+    return root * root
+
+
+def _square_terms(vector: _Reduced) -> int:
+    """Number of terms of the Fourier series of the squared length that suffices, or 0 if none or not normal alone."""
+    if len(vector.mean) < 3 or vector.contributions > len(vector.normal):
+        return 0
+    orders = np.array(_LINE_SERIES_TERMS)
+    values = np.abs(_square_characteristic(vector, orders * (math.pi / _square_support(vector))))
+    is_converged = values / orders < _LINE_SERIES_END_FRACTION
+    return _LINE_SERIES_TERMS[int(np.argmax(is_converged))] if is_converged.any() else 0
+
+
+def _square_characteristic(vector: _Reduced, waves: Floats) -> Complexes:
+    """Characteristic function of the squared length of a normal vector: noncentral chi-squares (Imhof 1961)."""
+    variances = np.einsum("ij,ij->i", vector.normal, vector.normal)
+    squares = (vector.normal @ vector.mean) ** 2 / variances
+    constant = max(float(vector.mean @ vector.mean) - float(squares.sum()), 0.0)
+    exponents, product = 1j * constant * waves, np.ones(len(waves), dtype=complex)
+    for variance, square in zip(variances.tolist(), squares.tolist(), strict=True):
+        factor = 1.0 - 2j * variance * waves
+        product *= np.sqrt(factor)
+        exponents = exponents + 1j * square * waves / factor
+    return np.asarray(np.exp(exponents) / product)
+
+
+def _square_series(vector: _Reduced, terms: int) -> Probability:
+    """Probability of the length of a normal vector, by the Fourier series of the density of its square."""
+    support = _square_support(vector)
+    orders = np.arange(1.0, terms + 1)
+    waves = np.asarray(orders * (math.pi / support))
+    # The density is continued evenly to negative squares, so that its series has cosines alone.
+    factors = _square_characteristic(vector, waves).real * _window(terms) * (2.0 / math.pi) / orders
+
+    def probability(limits: Floats) -> Floats:
+        inside = np.minimum(limits**2, support)
+        values = inside / support + np.sin(np.outer(inside, waves)) @ factors
+        return np.where(limits**2 < support, values, 1.0)
+
+    return probability
+
+
 def _plane_terms(vector: _Reduced) -> int:
     """Number of terms of the Fourier-Bessel series that suffices, or 0 if it converges too slowly."""
     support = vector.support
@@ -513,7 +572,7 @@ def _plane_series(vector: _Reduced, terms: int) -> Probability:
 @cache
 def _bessel_zeros() -> tuple[Floats, Floats]:
     """Zeros of J₀, and the values of J₁ there."""
-    zeros: Floats = (np.arange(_PLANE_SERIES_TERMS[-1]) + 0.75) * math.pi
+    zeros = np.asarray((np.arange(_PLANE_SERIES_TERMS[-1]) + 0.75) * math.pi, dtype=np.float64)
     for _ in range(6):
         zeros = zeros + _bessel(0, zeros) / _bessel(1, zeros)
     return zeros, _bessel(1, zeros)
@@ -816,7 +875,7 @@ def _tilted(edges: Floats, exponents: Floats, shares: Floats) -> tuple[Floats, F
 @cache
 def _lattice_turns(points: int, column: int) -> Floats:
     """One coordinate of the points of a lattice, from 0 to 1, (points,)."""
-    return ((np.arange(points) * int(_LATTICE_GENERATOR[column])) % points + 0.5) / points
+    return ((np.arange(points) * _LATTICE_GENERATOR[column]) % points + 0.5) / points
 
 
 @cache
