@@ -27,19 +27,21 @@ _SMALL_CONTRIBUTION_FRACTION = 1e-4  # of the longest contribution; a shorter on
 _RANK_ROUNDING_FRACTION = 1e-13  # of the largest singular value; directions with less have no width
 _ATOM_ROUNDING_PROBABILITY = 1e-12
 _SUPPORT_SIGMA = 7.7  # the probability that a normal vector is longer is less than 1e-12 in two dimensions
-_LINE_SERIES_END_FRACTION, _PLANE_SERIES_END_FRACTION = 1e-9, 2e-8  # a series ends at terms below this
+_SERIES_END_FRACTION = 1e-10  # a series ends at terms below this
+_LAST_SERIES_END_FRACTION = 3e-8  # a series with as many terms as are allowed is used if its last are below this
 _WINDOW_ORDER, _WINDOW_EXPONENT = 8, 36.0  # the last terms of a series are reduced, against overshoot at edges
 _LINE_SERIES_TERMS = (32, 128, 512, 2048, 8192)
 _PLANE_SERIES_TERMS = (16, 32, 64, 128, 256, 400)
-_LATTICE_POINTS = 2**14
+_LATTICE_POINTS = 2**15
 _CURVE_POINTS = 2**12  # of the lattice in one dimension
-_COARSE_STRIDE_POINTS = 8  # one point of this number gives the first approximation
+_COARSE_STRIDE_POINTS = 16  # one point of this number gives the first approximation
 _COUNT_POINTS = 2**17  # of the lattice if no contribution is integrated exactly
 _MAX_BOUND_COUNT = 16  # of bounds of which all signs are tried
 _MAX_MIXTURE_BOUND_COUNT = 12  # beside one other contribution
 _MAX_LATTICE_BOUND_COUNT = 8
 _MAX_CONFIDENCE_PROBABILITY = 1.0 - 1e-8  # at which the points of the lattice are laid out
-_TAIL_PROBABILITY = 0.99  # for higher confidences the points of the lattice are moved outwards
+_FAR_TAIL_PROBABILITY, _FAR_TAIL_POINTS = 0.9995, 2**16  # for higher confidences the lattice has more points
+_TAIL_PROBABILITY = 0.93  # for higher confidences the points of the lattice are moved outwards
 _QUADRATURE_NODES, _QUADRATURE_END_SIGMA = 48, 8.5
 _TILTED_CELLS = 256
 _LATTICE_EXACT_COUNT = 8  # of dimensions; with more, moments of the lattice are corrected
@@ -296,6 +298,9 @@ def _distribution(vector: _Reduced, confidence: float) -> Probability:
     """Probability of the length of the vector, for limits that it does not exceed with about a confidence."""
     if _is_normal(vector, 2) and len(vector.normal) == 2:
         return _plane_normal(vector)
+    if vector.contributions == len(vector.bound):
+        lengths = _lengths(_signed(vector))
+        return _counted(lengths * (1.0 - _ATOM_ROUNDING_PROBABILITY), np.full(len(lengths), 1.0 / len(lengths)))
     if len(vector.mean) == 1 and not _is_enumerated(vector):
         return _line_series(vector)
     if _square_terms(vector):
@@ -327,7 +332,7 @@ def _folded_normal_quantile(mean: float, sigma: float, confidence: float) -> flo
         density = math.exp(-0.5 * (score - ratio) ** 2) + math.exp(-0.5 * (score + ratio) ** 2)
         step = excess * math.sqrt(2.0 * math.pi) / density if density else math.inf
         following = score + step if low < score + step < high else 0.5 * (low + high)
-        if abs(following - score) <= 1e-13 * score:
+        if abs(following - score) <= 1e-13 * min(score, 1.0) + 1e-15 * score:
             return sigma * following
         score = following
     return sigma * score
@@ -463,20 +468,22 @@ def _envelope(vector: _Reduced, waves: Floats) -> Floats:
     return np.asarray(values)
 
 
-def _window(terms: int) -> Floats:
-    """Factors of the terms of a series: nearly 1, and at its end nearly 0."""
-    return np.asarray(np.exp(-_WINDOW_EXPONENT * ((np.arange(terms) + 0.5) / terms) ** _WINDOW_ORDER))
+def _window(values: Floats, is_converged: bool) -> Floats:
+    """Terms of a series, reduced to nearly 0 at its end if it has not converged."""
+    terms = len(values)
+    orders = (np.arange(terms) + 0.5) / terms
+    return values if is_converged else np.asarray(values * np.exp(-_WINDOW_EXPONENT * orders**_WINDOW_ORDER))
 
 
 def _line_series(vector: _Reduced) -> Probability:
     """Probability of the absolute value of a number, by the Fourier series of its density over its support."""
     support = vector.support
     envelopes = _envelope(vector, np.array(_LINE_SERIES_TERMS)[:, None] * (math.pi / support))
-    is_converged = envelopes / np.array(_LINE_SERIES_TERMS) < _LINE_SERIES_END_FRACTION
+    is_converged = envelopes / np.array(_LINE_SERIES_TERMS) < _SERIES_END_FRACTION
     terms = _LINE_SERIES_TERMS[int(np.argmax(is_converged)) if is_converged.any() else -1]
     orders = np.arange(1.0, terms + 1)
     waves: Floats = orders * (math.pi / support)
-    factors = _characteristic(vector, waves[:, None]) * _window(terms) * (2.0 / math.pi) / orders
+    factors = _window(_characteristic(vector, waves[:, None]), bool(is_converged.any())) * (2.0 / math.pi) / orders
 
     def probability(limits: Floats) -> Floats:
         inside = np.minimum(limits, support)
@@ -498,8 +505,15 @@ def _square_terms(vector: _Reduced) -> int:
         return 0
     orders = np.array(_LINE_SERIES_TERMS)
     values = np.abs(_square_characteristic(vector, orders * (math.pi / _square_support(vector))))
-    is_converged = values / orders < _LINE_SERIES_END_FRACTION
-    return _LINE_SERIES_TERMS[int(np.argmax(is_converged))] if is_converged.any() else 0
+    return _terms_of(values / orders, _LINE_SERIES_TERMS)
+
+
+def _terms_of(sizes: Floats, terms: tuple[int, ...]) -> int:
+    """First number of terms that suffices, from the sizes of the last term of each, or 0 if none does."""
+    is_converged = sizes < _SERIES_END_FRACTION
+    if is_converged.any():
+        return terms[int(np.argmax(is_converged))]
+    return terms[-1] if sizes[-1] < _LAST_SERIES_END_FRACTION else 0
 
 
 def _square_characteristic(vector: _Reduced, waves: Floats) -> Complexes:
@@ -521,7 +535,8 @@ def _square_series(vector: _Reduced, terms: int) -> Probability:
     orders = np.arange(1.0, terms + 1)
     waves = np.asarray(orders * (math.pi / support))
     # The density is continued evenly to negative squares, so that its series has cosines alone.
-    factors = _square_characteristic(vector, waves).real * _window(terms) * (2.0 / math.pi) / orders
+    values = np.asarray(_square_characteristic(vector, waves).real)
+    factors = _window(values, terms < _LINE_SERIES_TERMS[-1]) * (2.0 / math.pi) / orders
 
     def probability(limits: Floats) -> Floats:
         inside = np.minimum(limits**2, support)
@@ -533,13 +548,14 @@ def _square_series(vector: _Reduced, terms: int) -> Probability:
 
 def _plane_terms(vector: _Reduced) -> int:
     """Number of terms of the Fourier-Bessel series that suffices, or 0 if it converges too slowly."""
-    support = vector.support
+    support, sizes = vector.support, []
     for terms in _PLANE_SERIES_TERMS:
         angles = (np.arange(4 * terms) + 0.5) * (math.pi / (4 * terms))
         waves = np.stack((np.cos(angles), np.sin(angles)), axis=1) * (math.pi * terms / support)
-        if _envelope(vector, waves).mean() * 2.5 / math.sqrt(math.pi * terms) < _PLANE_SERIES_END_FRACTION:
+        sizes.append(float(_envelope(vector, waves).mean()) * 2.5 / math.sqrt(math.pi * terms))
+        if sizes[-1] < _SERIES_END_FRACTION:
             return terms
-    return 0
+    return _terms_of(np.array(sizes), _PLANE_SERIES_TERMS)
 
 
 def _plane_series(vector: _Reduced, terms: int) -> Probability:
@@ -560,7 +576,7 @@ def _plane_series(vector: _Reduced, terms: int) -> Probability:
         waves = (zeros[first:last, None, None] / support) * directions
         means[first:last] = _characteristic(vector, waves.reshape(-1, 2)).reshape(-1, count).mean(axis=1)
         first = last
-    factors = means * _window(terms) * 2.0 / (zeros * slopes**2)
+    factors = _window(means, terms < _PLANE_SERIES_TERMS[-1]) * 2.0 / (zeros * slopes**2)
 
     def probability(limits: Floats) -> Floats:
         inside = np.minimum(limits / support, 1.0)
@@ -714,6 +730,7 @@ def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probabilit
         is_tail = confidence > _TAIL_PROBABILITY and longest is not None
         tilt = _tilt(vector, confidence) if is_tail else None
         points = (_CURVE_POINTS if dimensions == 1 else _LATTICE_POINTS) if longest else _COUNT_POINTS
+        points = _FAR_TAIL_POINTS if tilt and confidence > _FAR_TAIL_PROBABILITY else points
         points //= stride
         centres, weights = _sampled(sampled, points, tilt)
         centres += np.tile(
@@ -726,7 +743,8 @@ def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probabilit
         return _counted(_lengths(centres), weights)
     length = math.hypot(*longest.row.tolist())
     along = centres @ (longest.row / length)
-    across_square = np.maximum(np.einsum("ij,ij->i", centres, centres) - along**2, 0.0)
+    across = centres - np.outer(along, longest.row / length)
+    across_square = np.einsum("ij,ij->i", across, across) if len(vector.mean) > 1 else np.zeros(len(along))
 
     def probability(limits: Floats) -> Floats:
         outside = []
@@ -808,7 +826,7 @@ def _tilt(vector: _Reduced, confidence: float) -> _Tilt:
         middle = 0.5 * (low + high)
         square = sum(value / (1.0 - middle * value) + mean / (1.0 - middle * value) ** 2 for value, mean in terms)
         low, high = (middle, high) if square < length * length else (low, middle)
-    return _Tilt(low, axes @ (means / (1.0 - low * variances)))
+    return _Tilt(low, vector.mean)
 
 
 def _sampled(vector: _Reduced, points: int, tilt: _Tilt | None) -> tuple[Floats, Floats]:
