@@ -677,10 +677,14 @@ def _tone_outside(low: Floats, high: Floats) -> Floats:
     return np.asarray(1.0 - (np.arcsin(np.clip(high, -1.0, 1.0)) - np.arcsin(np.clip(low, -1.0, 1.0))) / math.pi)
 
 
-def _without_longest(vector: _Reduced) -> tuple[_Integrated | None, _Reduced]:
-    """Take the contribution with the largest effect that can be integrated exactly from a vector."""
-    normal = _along_mean(vector)
-    effects = [_effects(vector.mean, normal), _effects(vector.mean, vector.uniform / math.sqrt(3.0))]
+def _without_longest(vector: _Reduced, confidence: float) -> tuple[_Integrated | None, _Reduced]:
+    """Take the contribution with the largest effect that can be integrated exactly from a vector.
+
+    For high confidences that is a normal one, unless the uniform ones are longer than all that it reaches.
+    """
+    normal = _along_longest(vector)
+    score = max(NormalDist().inv_cdf(min(confidence, 1.0 - 1e-12)) if confidence else 0.0, math.sqrt(3.0))
+    effects = [_effects(vector.mean, normal), _effects(vector.mean, vector.uniform / score)]
     first, second = (float(values.max(initial=0.0)) for values in effects)
     if first and first >= second:
         index = int(np.argmax(effects[0]))
@@ -702,18 +706,24 @@ def _effects(mean: Floats, rows: Floats) -> Floats:
     return np.asarray(np.sqrt(2.0 * np.einsum("ij,ij->i", rows, rows) ** 2 + 4.0 * (rows @ mean) ** 2))
 
 
-def _along_mean(vector: _Reduced) -> Floats:
-    """Normal contributions with the same covariance, of which only one changes the vector along its mean.
+def _along_longest(vector: _Reduced) -> Floats:
+    """Normal contributions with the same covariance, of which one alone changes the vector in one direction.
 
-    If the mean is short, the contributions remain perpendicular.
+    The direction is that of the mean, or, if the mean is short, that in which the vector varies most.
     """
-    mean, normal = vector.mean, vector.normal
-    components = normal @ mean
+    if len(vector.normal) < 2:
+        return vector.normal
+    variances, axes = np.linalg.eigh(vector.covariance)
+    axis = axes[:, -1]
+    if 2.0 * float(vector.mean @ vector.covariance @ vector.mean) > variances[-1] ** 2:
+        axis = vector.mean / math.hypot(*vector.mean.tolist())
+    components = vector.normal @ axis
     variance = float(components @ components)
-    if len(normal) < 2 or 2.0 * variance < float(normal[0] @ normal[0]) ** 2:
-        return normal
-    first = components @ normal / math.sqrt(variance)
-    return np.concatenate((first[None], _principal(_squares(normal) - np.outer(first, first))[: len(normal) - 1]))
+    if variance <= _RANK_ROUNDING_FRACTION * float(vector.normal[0] @ vector.normal[0]):
+        return vector.normal
+    first = components @ vector.normal / math.sqrt(variance)
+    remainder = _principal(_squares(vector.normal) - np.outer(first, first))[: len(vector.normal) - 1]
+    return np.concatenate((first[None], remainder))
 
 
 def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probability:
@@ -722,7 +732,7 @@ def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probabilit
     Only one of `stride` points of the lattice is used.
     """
     most = _MAX_MIXTURE_BOUND_COUNT if _is_enumerated(vector) else _MAX_LATTICE_BOUND_COUNT
-    longest, sampled = _without_longest(_with_few_bounds(vector, most))
+    longest, sampled = _without_longest(_with_few_bounds(vector, most), confidence)
     signed = _signed(sampled)
     dimensions = len(sampled.normal) + len(sampled.uniform) + len(sampled.tone)
     centres, weights = signed, np.full(len(signed), 1.0 / len(signed))
