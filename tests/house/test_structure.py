@@ -30,7 +30,7 @@ FLOORS = [
         "settings",
         "workers",
     },
-    {"geometry"},
+    {"geometry", "random_vector"},
     {"error_kinds"},
     {"image_plane"},
     {"theory", "evaluators", "catalogue"},
