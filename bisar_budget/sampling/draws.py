@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.variables import FIRST_HIDDEN, ToneMotion, Variable
+from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ToneMotion, Variable
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
@@ -73,7 +73,7 @@ class HeldSum(NamedTuple):
         `variables` are the variables of the mission. The result is (effects, effects), in the square of `unit`.
         """
         members = [variable for variable in variables if variable.owner in self.owners]
-        hidden = range(FIRST_HIDDEN, len(members[0].effects) if self.hides and members else FIRST_HIDDEN)
+        hidden = range(FIRST_HIDDEN_INDEX, len(members[0].effects) if self.hides and members else FIRST_HIDDEN_INDEX)
         scales = {**dict.fromkeys(self.columns, 1.0), **dict.fromkeys(hidden, self.gain)}
         return np.array([
             [scales[a] * scales[b] * math.fsum(member.covariance(a, b) for member in members) for b in scales]
@@ -88,10 +88,10 @@ class HeldSum(NamedTuple):
         """Include the hidden phase if it matters: if it exceeds a fraction of the rms of the judged phase."""
         if self.columns != (0,):
             return self
-        whole = self._replace(hides=True)
-        squares = np.diagonal(whole.covariance(variables))
+        including = self._replace(hides=True)
+        squares = np.diagonal(including.covariance(variables))
         is_hidden = squares[1:].sum() > _MIN_HIDDEN_FRACTION**2 * squares.sum()
-        return whole if is_hidden else self
+        return including if is_hidden else self
 
 
 class DrawsPiece(NamedTuple):
@@ -234,9 +234,9 @@ class Sums:
         columns = {column for requirement in drawing.judged for column in requirement.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(columns - {0})} if adds else {}
-        self.effect_count = max((len(variable.effects) for variable in drawing.variables), default=FIRST_HIDDEN)
+        self.effect_count = max((len(variable.effects) for variable in drawing.variables), default=FIRST_HIDDEN_INDEX)
         hides = adds and any(requirement.hides for requirement in drawing.judged)
-        shape = (self.effect_count - FIRST_HIDDEN, size)
+        shape = (self.effect_count - FIRST_HIDDEN_INDEX, size)
         self.hidden = {variable.owner: np.zeros(shape) for variable in drawing.variables} if hides else {}
         self.motion: dict[str, Floats] = {}
         self.tags: dict[str, Floats] = {}
@@ -292,7 +292,7 @@ class Sums:
             return
         targets = [(self.phases[owner], 0), *((total, column) for column, total in self.totals.items())]
         if self.hidden:
-            targets += [(part, FIRST_HIDDEN + index) for index, part in enumerate(self.hidden[owner])]
+            targets += [(phase, FIRST_HIDDEN_INDEX + index) for index, phase in enumerate(self.hidden[owner])]
         for target, column in targets:
             if effects[column]:
                 np.multiply(drawn, effects[column], out=self._scaled)
@@ -363,7 +363,7 @@ class Sums:
             return square
         square = square + (judged.gain * points.hidden) ** 2
         if judged.hides:  # exact ranges give no parts of the hidden phase: the squares add, as they do on average
-            square = square + judged.gain**2 * np.square(alone[FIRST_HIDDEN:]).sum(axis=0)
+            square = square + judged.gain**2 * np.square(alone[FIRST_HIDDEN_INDEX:]).sum(axis=0)
         return square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
