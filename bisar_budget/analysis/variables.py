@@ -371,8 +371,9 @@ class ErrorVariables:
         """Phases due to the cosine and the sine of a tone, (2, 8, cases). [rad]
 
         `waves` (2, nodes, cases) [m] are the range errors. The eight phases are quadratic, cubic, four parts of the
-        hidden phase, and the hidden phase beyond the cubic of the cosine and of the sine. The last two are 0 unless a
-        line of sight turns by more than a radian. They are separate because cosine and sine are orthogonal.
+        hidden phase, and two parts of the hidden phase beyond the cubic. The last two are 0 unless a line of sight
+        turns by more than a radian. Two parts are enough for the mean squares of cosine and sine and their mean
+        product, that is for the hidden phase in any phase of the tone.
         """
         exact = self._fine
         waves = np.broadcast_to(waves, (2, len(exact.times), self.analysis.cases))
@@ -380,9 +381,13 @@ class ErrorVariables:
         effects, seen = weighted.sum(axis=2), np.abs(weighted).sum(axis=2)
         effects = np.where(np.abs(effects) > VECTOR_ROUNDING_FRACTION * seen, effects, 0.0)
         remaining = exact.left_of_small(waves, (effects[:, EAST], effects[:, NORTH]))
-        _, beyond = exact.mean_squares(remaining, exact.fit @ remaining)
-        phase = QUADRATIC_OF_VARIANCE * exact.k * np.sqrt((1 + exact.band) * beyond) * exact.is_turned
-        further = phase * np.eye(2)[..., None]
+        beyond = remaining - exact.sampling.polynomials @ (exact.fit @ remaining)
+        products = np.einsum("n,anc,bnc->abc", exact.fit[0], beyond, beyond)
+        first = np.sqrt(products[0, 0])
+        shared = np.divide(products[0, 1], first, out=np.zeros_like(first), where=first > 0)
+        second = np.sqrt(np.maximum(products[1, 1] - shared**2, 0.0))
+        further = np.array(((first, 0.0 * first), (shared, second)))
+        further *= QUADRATIC_OF_VARIANCE * exact.k * np.sqrt(1 + exact.band) * exact.is_turned
         return np.concatenate((effects[:, :EAST], effects[:, FIRST_HIDDEN_INDEX:], further), axis=1)
 
 
