@@ -374,9 +374,10 @@ def montecarlo(runs: int) -> None:
     import numpy as np
 
     from bisar_budget.analysis.analysis import Analysis
+    from bisar_budget.analysis.variables import variables_of
     from bisar_budget.mission.load import parse_mission
     from bisar_budget.sampling.draws import _Stream
-    from bisar_budget.sampling.probability import _variables, monte_carlo
+    from bisar_budget.sampling.probability import monte_carlo
 
     motion = "{position: 1 m, velocity: 5 mm/s, acceleration: 20 ug}"
     text = f"""{{schema_version: 1, name: m, radar: {{center_frequency: 10 GHz, bandwidth: 300 MHz}},
@@ -390,7 +391,7 @@ def montecarlo(runs: int) -> None:
     n, seed = 1_000_000, 1
     analysis = Analysis(mission)
     declared = analysis.stated
-    variables = list(_variables(analysis))
+    variables = variables_of(analysis)
     sizes = [abs(s.declared) for s in declared]
 
     def draw() -> list[np.ndarray]:

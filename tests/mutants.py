@@ -462,7 +462,7 @@ MUTANTS = (
     ),
     Mutant(
         "seam: Monte Carlo counts twice what quadratic and cubic share",
-        "bisar_budget/sampling/probability.py",
+        "bisar_budget/analysis/variables.py",
         "covariance = covariance - np.multiply.outer(column, column)",
         "covariance = covariance + 0 * np.multiply.outer(column, column)",
         (f"{_SEAMS}test_what_a_cubic_shares_with_the_quadratic_is_drawn_once",),

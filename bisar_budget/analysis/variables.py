@@ -25,9 +25,9 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.tone_displacement import ToneDisplacement
-from bisar_budget.arrays import Floats, PerCase
+from bisar_budget.arrays import Booleans, Floats, PerCase
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain, subject
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.range_processes import effect_weights
 from bisar_budget.effects.sources import distribution_of, exact_ranges
@@ -37,7 +37,7 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, QUADRATIC_OF_VARIANCE, ExactRanges
 
 QUADRATIC, CUBIC, EAST, NORTH = range(4)  # indices of the effects of a variable
-FIRST_HIDDEN = 4  # index of the first part of the hidden phase; all further effects are parts of it too
+FIRST_HIDDEN_INDEX = 4  # index of the first part of the hidden phase; all further effects are parts of it too
 
 _EFFECT_COUNT = 8
 _TURNED_PART_COUNT = 2  # further parts of the hidden phase if a line of sight turns by more than a radian
@@ -110,7 +110,7 @@ class Variable(NamedTuple):
     @property
     def hides(self) -> bool:
         """Whether the variable has a part of the hidden phase."""
-        return any(self.affects(index) for index in range(FIRST_HIDDEN, len(self.effects)))
+        return any(self.affects(index) for index in range(FIRST_HIDDEN_INDEX, len(self.effects)))
 
 
 def variables_of(analysis: Analysis, case: int = 0) -> list[Variable]:
@@ -161,11 +161,11 @@ class ErrorVariables:
             correlation = np.array([[plain(rho, case) for rho in row] for row in group.correlation], float)
             for number, column in independent_columns(correlation, _CORRELATION_ROUNDING_FRACTION):
                 sizes = column / factor
-                parts = [
+                caused = [
                     (index, source, _declared(source) * sizes[axis].item())
                     for axis, (index, source) in enumerate(members)
                 ]
-                yield self._variable(f"{group.id}.{number}", group.id, group.platform, "normal", parts, case)
+                yield self._variable(f"{group.id}.{number}", group.id, group.platform, "normal", caused, case)
         for index, source in singles.values():
             distribution = distribution_of(mission, source)
             size = abs(_declared(source)) / (factor if source.is_covered else 1.0)
@@ -179,26 +179,26 @@ class ErrorVariables:
         of: str,
         owner: str,
         distribution: str,
-        parts: Sequence[tuple[int, ErrorSource, float]],
+        caused: Sequence[tuple[int, ErrorSource, float]],
         case: int,
     ) -> Variable:
-        sources_and_sizes = tuple((source, size) for _, source, size in parts)
-        return Variable(id, of, owner, distribution, sources_and_sizes, self._effects(parts, case))
+        sources_and_sizes = tuple((source, size) for _, source, size in caused)
+        return Variable(id, of, owner, distribution, sources_and_sizes, self._effects(caused, case))
 
-    def _effects(self, parts: Sequence[tuple[int, ErrorSource, float]], case: int) -> tuple[float, ...]:
+    def _effects(self, caused: Sequence[tuple[int, ErrorSource, float]], case: int) -> tuple[float, ...]:
         """Sum of the effects of errors in one case, in the form of `Variable.effects`.
 
-        Each item of `parts` has the index of the error in `DeclaredErrors.stated`, the error, and its size.
+        Each item of `caused` has the index of the error in `DeclaredErrors.stated`, the error, and its size.
         """
-        moving = [(source.full, size) for _, source, size in parts if source.is_motion]
+        moving = [(source.full, size) for _, source, size in caused if source.is_motion]
         effects = (
-            math.fsum(source.full.qpe * size for _, source, size in parts),
-            math.fsum(source.full.cubic * size for _, source, size in parts),
+            math.fsum(source.full.qpe * size for _, source, size in caused),
+            math.fsum(source.full.cubic * size for _, source, size in caused),
             math.fsum(full.east * size + 0.0 for full, size in moving),
             math.fsum(full.north * size + 0.0 for full, size in moving),
         )
         range_error = np.zeros(len(self.exact.times))
-        for index, source, size in parts:
+        for index, source, size in caused:
             if source.displaces and size:
                 range_error = range_error + self._range_errors[index][:, self._column(case)] * size
         return (*effects, *self._hidden(range_error, effects[EAST], effects[NORTH], case))
@@ -228,15 +228,15 @@ class ErrorVariables:
         """
         exact, column = self.exact, self._column(case)
         weights = exact.hidden_weights[..., column]
-        parts: list[float] = (weights @ range_error).tolist()
+        phases: list[float] = (weights @ range_error).tolist()
         if not exact.is_turned[column]:
-            return parts
+            return phases
         by_east, by_north = exact.slopes[..., column]
         remaining = range_error + by_east * east + by_north * north
         beyond = remaining - exact.sampling.polynomials @ (exact.fit @ remaining)
         square = (1 + float(exact.band[column])) * float(exact.fit[0] @ (beyond * beyond))
         phase = QUADRATIC_OF_VARIANCE * float(exact.k[column]) * math.sqrt(square)
-        return [*parts, phase, *[0.0] * (_TURNED_PART_COUNT - 1)]
+        return [*phases, phase, *[0.0] * (_TURNED_PART_COUNT - 1)]
 
     # ---------------------------------------------------------------- random errors
     def _of_random(self, case: int) -> Iterator[Variable]:
@@ -267,10 +267,13 @@ class ErrorVariables:
         covariance = np.array(effect.covariance) * size**2
         for index, column in independent_columns(covariance):
             variable_id = f"{error.id}{_VARIABLE_SUFFIXES[index]}"
+            # In a column of the hidden phase, the effects before it are rounding errors.
+            if index >= FIRST_HIDDEN_INDEX:
+                column[:FIRST_HIDDEN_INDEX] = 0.0
             effects = (*column.tolist(), *further)
             yield Variable(variable_id, error.id, error.owner, distribution, (), effects)
         square = (effect.hidden * size) ** 2
-        beyond = square - math.fsum(np.diagonal(covariance)[FIRST_HIDDEN:].tolist())
+        beyond = square - math.fsum(np.diagonal(covariance)[FIRST_HIDDEN_INDEX:].tolist())
         if is_turned and beyond > _BEYOND_ROUNDING_FRACTION * square:
             effects = (*(0.0,) * _EFFECT_COUNT, math.sqrt(beyond), *further[1:])
             yield Variable(f"{error.id}{_BEYOND_SUFFIX}", error.id, error.owner, distribution, (), effects)
@@ -298,13 +301,13 @@ class ErrorVariables:
     def _of_tones(self, case: int) -> Iterator[Variable]:
         """Yield the variables of the tones of oscillators, which displace the image, one for each frequency."""
         is_turned = bool(self.exact.is_turned[self._column(case)])
-        hidden = (0.0,) * (_EFFECT_COUNT - FIRST_HIDDEN + _TURNED_PART_COUNT * is_turned)
+        hidden = (0.0,) * (_EFFECT_COUNT - FIRST_HIDDEN_INDEX + _TURNED_PART_COUNT * is_turned)
         for tone in self.analysis.displacing_tones:
             if tone.subject.id in self._vibrations:
                 continue
-            for index, part in enumerate(tone.full):
-                moved = [wave[:, case if wave.shape[-1] > 1 else 0].tolist() for wave in part.waves]
-                effects, quadrature = ((0.0, 0.0, *place, *hidden) for place in moved)
+            for index, component in enumerate(tone.full):
+                moved = [wave[:, case if wave.shape[-1] > 1 else 0].tolist() for wave in component.waves]
+                effects, quadrature = ((0.0, 0.0, east, north, *hidden) for east, north in moved)
                 variable_id = tone.subject.id if len(tone.full) == 1 else f"{tone.subject.id}.{index}"
                 if any(effects) or any(quadrature):
                     row_id, owner = tone.subject.id, tone.subject.owner
@@ -313,7 +316,14 @@ class ErrorVariables:
     @cached_property
     def _vibrations(self) -> dict[str, list["_Vibration"]]:
         """Sinusoidal vibrations of platforms along each of their axes, by the id of the row."""
-        return {tone.subject.id: self._axes_of(tone) for tone in self.analysis.displacing_tones if _shakes(tone)}
+        platforms = self.analysis.mission.platforms
+        ids = {
+            subject(name, "vibration", "sinusoidal", entry=index).id
+            for name in PLATFORMS
+            for index in range(len(getattr(platforms, name).motion_error.vibration.sinusoidal))
+        }
+        tones = [tone for tone in self.analysis.displacing_tones if tone.subject.id in ids]
+        return {tone.subject.id: self._axes_of(tone) for tone in tones}
 
     def _axes_of(self, tone: ToneDisplacement) -> list["_Vibration"]:
         mission, geometry = self.analysis.mission, self.analysis.geometry
@@ -331,7 +341,7 @@ class ErrorVariables:
             along = [exact.along(platform_index, _sight(exact, platform_index))]
             ways = [_sight(self.exact, platform_index)]
         is_range_error = not (is_heard or isinstance(value, tuple))
-        is_slow = np.asarray(frequency * mission.collection.aperture_time < SLOWEST_ECHO_CYCLES)
+        is_slow: Booleans = np.asarray(frequency * mission.collection.aperture_time < SLOWEST_ECHO_CYCLES)
         angle = 2 * math.pi * frequency * exact.times
         waves = np.array((np.cos(angle), -np.sin(angle))) * is_slow
         return [
@@ -361,8 +371,9 @@ class ErrorVariables:
         """Phases due to the cosine and the sine of a tone, (2, 8, cases). [rad]
 
         `waves` (2, nodes, cases) [m] are the range errors. The eight phases are quadratic, cubic, four parts of the
-        hidden phase, and the hidden phase beyond the cubic of the cosine and of the sine. The last two are 0 unless a
-        line of sight turns by more than a radian. They are separate because cosine and sine are orthogonal.
+        hidden phase, and two parts of the hidden phase beyond the cubic. The last two are 0 unless a line of sight
+        turns by more than a radian. Two parts are enough for the mean squares of cosine and sine and their mean
+        product, that is for the hidden phase in any phase of the tone.
         """
         exact = self._fine
         waves = np.broadcast_to(waves, (2, len(exact.times), self.analysis.cases))
@@ -370,10 +381,14 @@ class ErrorVariables:
         effects, seen = weighted.sum(axis=2), np.abs(weighted).sum(axis=2)
         effects = np.where(np.abs(effects) > VECTOR_ROUNDING_FRACTION * seen, effects, 0.0)
         remaining = exact.left_of_small(waves, (effects[:, EAST], effects[:, NORTH]))
-        _, beyond = exact.mean_squares(remaining, exact.fit @ remaining)
-        phase = QUADRATIC_OF_VARIANCE * exact.k * np.sqrt((1 + exact.band) * beyond) * exact.is_turned
-        further = phase * np.eye(2)[..., None]
-        return np.concatenate((effects[:, :EAST], effects[:, FIRST_HIDDEN:], further), axis=1)
+        beyond = remaining - exact.sampling.polynomials @ (exact.fit @ remaining)
+        products = np.einsum("n,anc,bnc->abc", exact.fit[0], beyond, beyond)
+        first = np.sqrt(products[0, 0])
+        shared = np.divide(products[0, 1], first, out=np.zeros_like(first), where=first > 0)
+        second = np.sqrt(np.maximum(products[1, 1] - shared**2, 0.0))
+        further = np.array(((first, 0.0 * first), (shared, second)))
+        further *= QUADRATIC_OF_VARIANCE * exact.k * np.sqrt(1 + exact.band) * exact.is_turned
+        return np.concatenate((effects[:, :EAST], effects[:, FIRST_HIDDEN_INDEX:], further), axis=1)
 
 
 class _Vibration(NamedTuple):
@@ -389,7 +404,7 @@ class _Vibration(NamedTuple):
     size: PerCase
     platform_index: int
     way: Vectors | None
-    is_slow: Floats
+    is_slow: Booleans
 
     def motion(self, case: int) -> ToneMotion | None:
         """Return the motion in the case with the given index; None if the vibration is not slow."""
@@ -413,11 +428,6 @@ def _sight(exact: ExactRanges, platform_index: int) -> Vectors:
     """Unit vector from the scene centre to a platform at the nodes, three components (nodes, cases)."""
     x, y, z = (component / exact.ranges[platform_index] for component in exact.tracks[platform_index])
     return (x, y, z)
-
-
-def _shakes(tone: ToneDisplacement) -> bool:
-    """Whether a tone is the vibration of a platform, and not a tone of an oscillator."""
-    return tone.subject.kind == "vibration"
 
 
 def _declared(source: ErrorSource) -> float:

@@ -13,6 +13,7 @@ __all__ = [
     "oscillators",
     "random_effect",
     "random_errors",
+    "range_processes",
     "slow_tones",
     "sources",
     "spectra",

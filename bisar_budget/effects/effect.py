@@ -174,7 +174,7 @@ class ErrorSource(NamedTuple):
     of_receiver: Vectors | None = None
     shifts: tuple[VectorArrays, VectorArrays] | None = None
     rates: tuple[Vectors, Vectors] | None = None
-    bias: Any = 0.0
+    bias: PerCase = 0.0
 
     @property
     def id(self) -> str:

@@ -8,7 +8,7 @@ DRAW_SENTENCES: dict[str, str] = {
     "drawn-all-at-once": "a draw is the sum of all errors; the rows are judged one by one (allocation.combine: each)",
     "drawn-as-bounds": "{row_ids:list}: drawn as plus or minus the declared value, which has no distribution",
     "vibration-is-not-drawn": (
-        "{row_ids:list}: not drawn, because a wideband vibration only spreads power, which ISLR limits"
+        "{row_ids:list}: not drawn, because paired echoes and spread power are in check alone"
     ),
     "stated-power-is-not-drawn": "{row_ids:list}: not drawn, since a stated power is in check alone",
     "unknown-drift-is-not-drawn": (

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.variables import FIRST_HIDDEN, ToneMotion, Variable
+from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ToneMotion, Variable
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
@@ -73,7 +73,7 @@ class HeldSum(NamedTuple):
         `variables` are the variables of the mission. The result is (effects, effects), in the square of `unit`.
         """
         members = [variable for variable in variables if variable.owner in self.owners]
-        hidden = range(FIRST_HIDDEN, len(members[0].effects) if self.hides and members else FIRST_HIDDEN)
+        hidden = range(FIRST_HIDDEN_INDEX, len(members[0].effects) if self.hides and members else FIRST_HIDDEN_INDEX)
         scales = {**dict.fromkeys(self.columns, 1.0), **dict.fromkeys(hidden, self.gain)}
         return np.array([
             [scales[a] * scales[b] * math.fsum(member.covariance(a, b) for member in members) for b in scales]
@@ -88,10 +88,10 @@ class HeldSum(NamedTuple):
         """Include the hidden phase if it matters: if it exceeds a fraction of the rms of the judged phase."""
         if self.columns != (0,):
             return self
-        whole = self._replace(hides=True)
-        squares = np.diagonal(whole.covariance(variables))
+        including = self._replace(hides=True)
+        squares = np.diagonal(including.covariance(variables))
         is_hidden = squares[1:].sum() > _MIN_HIDDEN_FRACTION**2 * squares.sum()
-        return whole if is_hidden else self
+        return including if is_hidden else self
 
 
 class DrawsPiece(NamedTuple):
@@ -225,8 +225,8 @@ class Sums:
     draws). `alone` (effects, draws) is for errors and tones of which only the effects are known, in the order of
     `Variable.effects`.
 
-    `hidden` (parts, draws) are the parts of the hidden phase for each owner. It is empty unless effects are summed
-    and a requirement includes the hidden phase.
+    `hidden` (parts, draws) are the first-order parts of the hidden phase for each owner. It is empty unless a
+    requirement includes the hidden phase.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -234,9 +234,9 @@ class Sums:
         columns = {column for requirement in drawing.judged for column in requirement.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(columns - {0})} if adds else {}
-        self.effect_count = max((len(variable.effects) for variable in drawing.variables), default=FIRST_HIDDEN)
-        hides = adds and any(requirement.hides for requirement in drawing.judged)
-        shape = (self.effect_count - FIRST_HIDDEN, size)
+        self.effect_count = max((len(variable.effects) for variable in drawing.variables), default=FIRST_HIDDEN_INDEX)
+        hides = any(requirement.hides for requirement in drawing.judged)
+        shape = (self.effect_count - FIRST_HIDDEN_INDEX, size)
         self.hidden = {variable.owner: np.zeros(shape) for variable in drawing.variables} if hides else {}
         self.motion: dict[str, Floats] = {}
         self.tags: dict[str, Floats] = {}
@@ -288,11 +288,11 @@ class Sums:
         return 2 * len(self.exact.times) - 1 >= angle + _ORDERS_BESIDE_TONE_COUNT
 
     def _add_to_sums(self, owner: str, effects: tuple[float, ...], drawn: Floats) -> None:
-        if not self.phases:
-            return
-        targets = [(self.phases[owner], 0), *((total, column) for column, total in self.totals.items())]
+        targets = [(total, column) for column, total in self.totals.items()]
+        if self.phases:
+            targets.insert(0, (self.phases[owner], 0))
         if self.hidden:
-            targets += [(part, FIRST_HIDDEN + index) for index, part in enumerate(self.hidden[owner])]
+            targets += [(phase, FIRST_HIDDEN_INDEX + index) for index, phase in enumerate(self.hidden[owner])]
         for target, column in targets:
             if effects[column]:
                 np.multiply(drawn, effects[column], out=self._scaled)
@@ -361,10 +361,14 @@ class Sums:
         square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
         if judged.columns != (0,):
             return square
-        square = square + (judged.gain * points.hidden) ** 2
-        if judged.hides:  # exact ranges give no parts of the hidden phase: the squares add, as they do on average
-            square = square + judged.gain**2 * np.square(alone[FIRST_HIDDEN:]).sum(axis=0)
-        return square
+        hidden, alone = points.hidden, alone[FIRST_HIDDEN_INDEX:]
+        if judged.hides and alone.any():
+            # Exact ranges give the length of the vector of hidden phases, and first-order effects its direction.
+            moving = _sum(self.hidden, owners, alone) - alone
+            length = np.sqrt(np.square(moving).sum(axis=0))
+            ratio = np.divide(hidden, length, out=np.zeros_like(hidden), where=length > 0)
+            hidden = np.sqrt(np.square(ratio * moving + alone).sum(axis=0) + np.where(length > 0, 0.0, hidden**2))
+        return square + (judged.gain * hidden) ** 2
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]

@@ -40,7 +40,7 @@ _MATERIAL_FRACTION = 0.1  # of the probability of failure; a smaller difference 
 
 _SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
 _CIRCLE_NODES = 4096  # number of angles for the mean of a smooth function on a circle
-_TALBOT_TERMS = 20  # of the inversion of a Laplace transform, which then is accurate to about 1e-9
+_TALBOT_TERM_COUNT = 20  # of the inversion of a Laplace transform, which then is accurate to about 1e-9
 
 
 def monte_carlo(
@@ -93,7 +93,7 @@ def monte_carlo(
         probability_low=low,
         probability_high=high,
         is_exact=drawing.is_exact,
-        notes=tuple(_notes(mission, analysis, is_exact=drawing.is_exact, is_placed=is_placed)),
+        notes=tuple(_notes(mission, analysis, variables, judged, is_exact=drawing.is_exact, is_placed=is_placed)),
     )
 
 
@@ -220,7 +220,7 @@ def _within_limit(radius: float, covariance: Floats) -> float:
     if not squares:
         return 1.0
     scale = max(squares)
-    ratio = 2 * _TALBOT_TERMS * scale / (5 * radius**2)
+    ratio = 2 * _TALBOT_TERM_COUNT * scale / (5 * radius**2)
 
     def transformed(s: complex) -> complex:
         value = 1 / s
@@ -230,13 +230,13 @@ def _within_limit(radius: float, covariance: Floats) -> float:
 
     reach = radius**2 / scale
     total = 0.5 * math.exp(ratio * reach) * transformed(complex(ratio)).real
-    for term in range(1, _TALBOT_TERMS):
-        angle = term * math.pi / _TALBOT_TERMS
+    for term in range(1, _TALBOT_TERM_COUNT):
+        angle = term * math.pi / _TALBOT_TERM_COUNT
         cotangent = 1 / math.tan(angle)
         s = ratio * angle * complex(cotangent, 1)
         slope = complex(1, angle + (angle * cotangent - 1) * cotangent)
         total += (cmath.exp(reach * s) * transformed(s) * slope).real
-    return min(1.0, max(0.0, ratio / _TALBOT_TERMS * total))
+    return min(1.0, max(0.0, ratio / _TALBOT_TERM_COUNT * total))
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
@@ -303,7 +303,15 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
         )
 
 
-def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
+def _notes(
+    mission: Mission,
+    analysis: Analysis,
+    variables: Sequence[Variable],
+    judged: Sequence[HeldSum],
+    *,
+    is_exact: bool,
+    is_placed: bool,
+) -> Iterator[Note]:
     """Yield notes on errors that are drawn by a convention of this program, and on errors that are not drawn."""
     if is_exact:
         yield phrases.note("drawn-through-exact-ranges")
@@ -315,10 +323,12 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     bounds += [error.id for error in analysis.random if not error.is_covered]
     if bounds:
         yield phrases.note("drawn-as-bounds", row_ids=bounds)
+    drawn = {v.of for v in variables if any(requirement.is_affected_by(v) for requirement in judged)}
     noisy = [name for name in PLATFORMS if getattr(mission.platforms, name).motion_error.vibration.wideband]
-    if noisy:
-        row_ids = [subject(name, "vibration", "wideband").id for name in noisy]
-        yield phrases.note("vibration-is-not-drawn", row_ids=row_ids)
+    shaken = [tone.subject.id for tone in analysis.displacing_tones if tone.subject.id not in drawn]
+    shaken += [subject(name, "vibration", "wideband").id for name in noisy]
+    if shaken:
+        yield phrases.note("vibration-is-not-drawn", row_ids=shaken)
     powers = [power.subject.id for power in stated_powers(mission)]
     if powers:
         yield phrases.note("stated-power-is-not-drawn", row_ids=powers)

@@ -174,7 +174,7 @@ def test_a_long_correlation_time_is_a_delay_that_stays(text: str, figure: str, o
             stated = f"{{{owner}: {stated}}}"
         mission, errors = errors_of(text, stated)
         found.append(errors[figure if owner == "both" else f"{owner}.{figure}"].full)
-    stays, long, longest = found
+    stays, long, longest = (one._replace(covariance=one.covariance[:4, :4]) for one in found)
     assert stays.spread == 0
     sizes = np.sqrt(np.diagonal(long.covariance))
     limit = (1e9 * longest.covariance - 1e7 * long.covariance) / (1e9 - 1e7)
