@@ -16,10 +16,9 @@ from functools import cached_property
 
 import numpy as np
 
+from bisar_budget.analysis import variables as effects_of
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.variables import CUBIC as CUBIC_INDEX
-from bisar_budget.analysis.variables import EAST, FIRST_HIDDEN, NORTH, ErrorVariables, Variable
-from bisar_budget.analysis.variables import QUADRATIC as QUADRATIC_INDEX
+from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ErrorVariables, Variable
 from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
@@ -76,7 +75,7 @@ class Totals:
         owners = {source.id: source.owner for source in self.errors.stated}
         biases = [effects for row_id, effects in self._biases_of(model, case).items() if is_member(owners[row_id])]
         lengths = [len(effects) for effects in (*biases, *(each.effects for each in variables))]
-        columns, weights = _columns(requirement, max(lengths, default=FIRST_HIDDEN), plain(gain, case))
+        columns, weights = _columns(requirement, max(lengths, default=FIRST_HIDDEN_INDEX), plain(gain, case))
         parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": []}
         for variable in variables:
             vector = (
@@ -144,7 +143,7 @@ class Totals:
             if model == "published":
                 sources = {source.id: source.in_one_case(case) for source in self.errors.stated}
                 biases = {
-                    row_id: self._published_effects([(sources[row_id], sources[row_id].bias)], case)
+                    row_id: self._published_effects([(sources[row_id], float(sources[row_id].bias))], case)
                     for row_id in biases
                 }
             self._biases[model, case] = biases
@@ -166,7 +165,7 @@ class Totals:
             distribution = "normal" if error.is_covered else "bound"
             for index, sigma in enumerate((effect.quadratic, effect.cubic, effect.east, effect.north)):
                 if sigma and math.isfinite(sigma):
-                    effects = tuple(sigma * size if place == index else 0.0 for place in range(FIRST_HIDDEN))
+                    effects = tuple(sigma * size if place == index else 0.0 for place in range(FIRST_HIDDEN_INDEX))
                     published.append(
                         Variable(f"{error.id}.{index}", error.id, error.owner, distribution, (), effects)
                     )
@@ -175,7 +174,7 @@ class Totals:
         for each in variables:
             if each.distribution != "tone":
                 continue
-            effects, quadrature = each.effects[:EAST], each.quadrature[:EAST]
+            effects, quadrature = each.effects[: effects_of.EAST], each.quadrature[: effects_of.EAST]
             published.append(each._replace(effects=(*effects, 0.0, 0.0), quadrature=(*quadrature, 0.0, 0.0)))
             seen.add(each.of)
         for row_id, tone in moved.items():
@@ -199,7 +198,7 @@ class Totals:
 
     def _published_effects(self, parts: Sequence[tuple[ErrorSource, float]], case: int) -> tuple[float, ...]:
         plane = self.errors.planes["published"]
-        effects = np.zeros(FIRST_HIDDEN)
+        effects = np.zeros(FIRST_HIDDEN_INDEX)
         for source, size in parts:
             moved = (
                 [plain(each, case) for each in plane.displacement(source.effect, size)] if source.is_motion else []
@@ -232,11 +231,11 @@ class Totals:
 def _columns(requirement: str, count: int, gain: float) -> tuple[list[int], Floats]:
     """Indices of the effects whose length a requirement limits, and the factors of these effects."""
     if requirement == LOCATION:
-        return [EAST, NORTH], np.ones(2)
+        return [effects_of.EAST, effects_of.NORTH], np.ones(2)
     if requirement == CUBIC:
-        return [CUBIC_INDEX], np.ones(1)
-    hidden = list(range(FIRST_HIDDEN, count))
-    return [QUADRATIC_INDEX, *hidden], np.array([1.0, *(gain for _ in hidden)])
+        return [effects_of.CUBIC], np.ones(1)
+    hidden = list(range(FIRST_HIDDEN_INDEX, count))
+    return [effects_of.QUADRATIC, *hidden], np.array([1.0, *(gain for _ in hidden)])
 
 
 def _taken(effects: Sequence[float], columns: Sequence[int]) -> Floats:
