@@ -140,38 +140,35 @@ class ErrorVariables:
         """Effects of the biases of the stated errors in the case with the given index.
 
         The keys are the ids of the errors that have a bias. The effects are in the form of `Variable.effects`, and
-        are computed to first order. The square of the part beyond the cubic of several biases is not exact.
+        are computed to first order. If a line of sight turns by more than a radian, the part beyond the cubic is
+        exact for a single bias only.
         """
-        stated = enumerate(self.analysis.errors.stated)
-        sources = [(index, source.in_one_case(case)) for index, source in stated if np.any(source.bias)]
-        return {
-            source.id: self._effects([(index, source, float(source.bias))], case)
-            for index, source in sources
-            if source.bias
-        }
+        sources = [source.in_one_case(case) for source in self._biased]
+        return {source.id: self._effects([(source, float(source.bias))], case) for source in sources if source.bias}
+
+    @property
+    def _biased(self) -> list[ErrorSource]:
+        """Errors with a bias in at least one case, along the axes in which the mission file states them."""
+        return [source for source in self.analysis.errors.listed if source.is_independent and np.any(source.bias)]
 
     # ---------------------------------------------------------------- stated errors
     def _of_stated(self, case: int) -> Iterator[Variable]:
         mission = self.analysis.mission
         factor = plain(mission.allocation.coverage_factor, case)
-        stated = enumerate(self.analysis.errors.stated)
-        singles = {source.id: (index, source.in_one_case(case)) for index, source in stated}
+        singles = {source.id: source.in_one_case(case) for source in self.analysis.errors.stated}
         for group in self.analysis.groups:
             members = [singles.pop(row_id) for row_id in group.ids]
             correlation = np.array([[plain(rho, case) for rho in row] for row in group.correlation], float)
             for number, column in independent_columns(correlation, _CORRELATION_ROUNDING_FRACTION):
                 sizes = column / factor
-                caused = [
-                    (index, source, _declared(source) * sizes[axis].item())
-                    for axis, (index, source) in enumerate(members)
-                ]
+                caused = [(source, _declared(source) * sizes[axis].item()) for axis, source in enumerate(members)]
                 yield self._variable(f"{group.id}.{number}", group.id, group.platform, "normal", caused, case)
-        for index, source in singles.values():
+        for source in singles.values():
             distribution = distribution_of(mission, source)
             size = abs(_declared(source)) / (factor if source.is_covered else 1.0)
             if distribution == "uniform":
                 size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
-            yield self._variable(source.id, source.id, source.owner, distribution, [(index, source, size)], case)
+            yield self._variable(source.id, source.id, source.owner, distribution, [(source, size)], case)
 
     def _variable(
         self,
@@ -179,40 +176,39 @@ class ErrorVariables:
         of: str,
         owner: str,
         distribution: str,
-        caused: Sequence[tuple[int, ErrorSource, float]],
+        caused: Sequence[tuple[ErrorSource, float]],
         case: int,
     ) -> Variable:
-        sources_and_sizes = tuple((source, size) for _, source, size in caused)
-        return Variable(id, of, owner, distribution, sources_and_sizes, self._effects(caused, case))
+        return Variable(id, of, owner, distribution, tuple(caused), self._effects(caused, case))
 
-    def _effects(self, caused: Sequence[tuple[int, ErrorSource, float]], case: int) -> tuple[float, ...]:
+    def _effects(self, caused: Sequence[tuple[ErrorSource, float]], case: int) -> tuple[float, ...]:
         """Sum of the effects of errors in one case, in the form of `Variable.effects`.
 
-        Each item of `caused` has the index of the error in `DeclaredErrors.stated`, the error, and its size.
+        Each item of `caused` has an error and its size.
         """
-        moving = [(source.full, size) for _, source, size in caused if source.is_motion]
+        moving = [(source.full, size) for source, size in caused if source.is_motion]
         effects = (
-            math.fsum(source.full.qpe * size for _, source, size in caused),
-            math.fsum(source.full.cubic * size for _, source, size in caused),
+            math.fsum(source.full.qpe * size for source, size in caused),
+            math.fsum(source.full.cubic * size for source, size in caused),
             math.fsum(full.east * size + 0.0 for full, size in moving),
             math.fsum(full.north * size + 0.0 for full, size in moving),
         )
         range_error = np.zeros(len(self.exact.times))
-        for index, source, size in caused:
+        for source, size in caused:
             if source.displaces and size:
-                range_error = range_error + self._range_errors[index][:, self._column(case)] * size
+                range_error = range_error + self._range_errors[source.id][:, self._column(case)] * size
         return (*effects, *self._hidden(range_error, effects[EAST], effects[NORTH], case))
 
     @cached_property
-    def _range_errors(self) -> dict[int, Floats]:
+    def _range_errors(self) -> dict[str, Floats]:
         """Range error at the nodes due to one unit of each stated error that displaces the image, (nodes, cases).
 
-        The keys are the indices of the errors in `DeclaredErrors.stated`. The unit is m per unit of the error.
+        The keys are the ids of the errors. The unit is m per unit of the error.
         """
         errors = self.analysis.errors
         return {
-            index: self.exact.range_error(errors.lanes(source))
-            for index, source in enumerate(errors.stated)
+            source.id: self.exact.range_error(errors.lanes(source))
+            for source in (*errors.stated, *self._biased)
             if source.displaces
         }
 
