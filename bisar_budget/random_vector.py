@@ -44,6 +44,7 @@ _FAR_TAIL_PROBABILITY, _FAR_TAIL_POINTS = 0.9995, 2**16  # for higher confidence
 _TAIL_PROBABILITY = 0.93  # for higher confidences the points of the lattice are moved outwards
 _QUADRATURE_NODES, _QUADRATURE_END_SIGMA = 48, 8.5
 _TILTED_CELLS = 256
+_STRETCHED_COUNT, _STRETCHED_VARIANCE_RATIO = 4, 2.5
 _LATTICE_EXACT_COUNT = 8  # of dimensions; with more, moments of the lattice are corrected
 _MAX_SOLVER_STEPS = 100
 _COARSE_TOLERANCE_FRACTION = 1e-3
@@ -167,7 +168,7 @@ class _Reduced(NamedTuple):
         covariance = self.covariance
         mean_square = float(np.trace(covariance) + self.mean @ self.mean)
         variance = 2.0 * float(np.sum(covariance**2)) + 4.0 * float(self.mean @ covariance @ self.mean)
-        return mean_square, math.sqrt(variance / 9.0) / mean_square
+        return mean_square, max(math.sqrt(variance / 9.0) / mean_square, 1e-12)
 
 
 def _squares(rows: Floats) -> Floats:
@@ -314,7 +315,7 @@ def _distribution(vector: _Reduced, confidence: float) -> Probability:
 
 def _folded_normal_quantile(mean: float, sigma: float, confidence: float) -> float:
     """Length that a normal number does not exceed, by Newton's method within a bracket."""
-    if sigma == 0.0:
+    if sigma <= _RANK_ROUNDING_FRACTION * mean:
         return mean
     if mean == 0.0:
         return sigma * _half_normal_score(confidence)
@@ -819,6 +820,7 @@ class _Tilt(NamedTuple):
 
     exponent: float
     mean: Floats
+    least_variance: float  # of each normal contribution, relative to its own
 
     def of_deviations(self, rows: Floats) -> Floats:
         """Logarithm of the factor for deviations (rows, m)."""
@@ -836,7 +838,9 @@ def _tilt(vector: _Reduced, confidence: float) -> _Tilt:
         middle = 0.5 * (low + high)
         square = sum(value / (1.0 - middle * value) + mean / (1.0 - middle * value) ** 2 for value, mean in terms)
         low, high = (middle, high) if square < length * length else (low, middle)
-    return _Tilt(low, vector.mean)
+    # Few normal contributions beside long uniform ones go farther than the normal vector of the same covariance.
+    is_stretched = confidence > _FAR_TAIL_PROBABILITY and len(vector.normal) <= _STRETCHED_COUNT
+    return _Tilt(low, vector.mean, _STRETCHED_VARIANCE_RATIO if is_stretched else 1.0)
 
 
 def _sampled(vector: _Reduced, points: int, tilt: _Tilt | None) -> tuple[Floats, Floats]:
@@ -866,7 +870,7 @@ def _normal_samples(row: Floats, points: int, tilt: _Tilt | None, column: int) -
     if tilt is None:
         return np.outer(scores, row), None
     variance = 1.0 / (1.0 - tilt.exponent * float(row @ row))
-    spread = math.sqrt(variance)
+    spread = math.sqrt(max(variance, tilt.least_variance))
     tilted = variance * tilt.exponent * float(row @ tilt.mean) + spread * scores
     return np.outer(tilted, row), spread * np.exp(0.5 * (scores**2 - tilted**2))
 
