@@ -34,16 +34,17 @@ _LINE_SERIES_TERMS = (32, 128, 512, 2048, 8192)
 _PLANE_SERIES_TERMS = (16, 32, 64, 128, 256, 400)
 _LATTICE_POINTS = 2**15
 _CURVE_POINTS = 2**12  # of the lattice in one dimension
-_COARSE_STRIDE_POINTS = 16  # one point of this number gives the first approximation
+_COARSE_STRIDE_POINTS = 16  # the first approximation has fewer points by this factor
 _COUNT_POINTS = 2**17  # of the lattice if no contribution is integrated exactly
 _MAX_BOUND_COUNT = 16  # of bounds of which all signs are tried
-_MAX_MIXTURE_BOUND_COUNT = 12  # beside one other contribution
+_MAX_MIXTURE_BOUND_COUNT = 12  # beside a single contribution of another kind
 _MAX_LATTICE_BOUND_COUNT = 8
 _MAX_CONFIDENCE_PROBABILITY = 1.0 - 1e-8  # at which the points of the lattice are laid out
 _FAR_TAIL_PROBABILITY, _FAR_TAIL_POINTS = 0.9995, 2**16  # for higher confidences the lattice has more points
 _TAIL_PROBABILITY = 0.93  # for higher confidences the points of the lattice are moved outwards
 _QUADRATURE_NODES, _QUADRATURE_END_SIGMA = 48, 8.5
 _TILTED_CELLS = 256
+_SMOOTH_FRACTION = 0.01  # of the longest tone; least length of a contribution that is integrated exactly
 _STRETCHED_COUNT, _STRETCHED_VARIANCE_RATIO = 4, 2.5
 _LATTICE_EXACT_COUNT = 8  # of dimensions; with more, moments of the lattice are corrected
 _MAX_SOLVER_STEPS = 100
@@ -273,7 +274,7 @@ def _tolerance(vector: _Reduced) -> float:
 
 
 def _is_enumerated(vector: _Reduced) -> bool:
-    """Whether the probability is the mean of exact ones over the signs of bounds."""
+    """Whether the probability is the mean of exact probabilities over the signs of bounds."""
     return vector.contributions - len(vector.bound) == 1 and len(vector.bound) <= _MAX_MIXTURE_BOUND_COUNT
 
 
@@ -681,12 +682,16 @@ def _tone_outside(low: Floats, high: Floats) -> Floats:
 def _without_longest(vector: _Reduced, confidence: float) -> tuple[_Integrated | None, _Reduced]:
     """Take the contribution with the largest effect that can be integrated exactly from a vector.
 
-    For high confidences that is a normal one, unless the uniform ones are longer than all that it reaches.
+    For high confidences that is a normal contribution, unless a uniform contribution is longer than its quantile.
     """
     normal = _along_longest(vector)
     score = max(NormalDist().inv_cdf(min(confidence, 1.0 - 1e-12)) if confidence else 0.0, math.sqrt(3.0))
     effects = [_effects(vector.mean, normal), _effects(vector.mean, vector.uniform / score)]
     first, second = (float(values.max(initial=0.0)) for values in effects)
+    # Beside a long tone, a short contribution does not make the probability smooth.
+    longest = max(float(_lengths(rows).max(initial=0.0)) for rows in (normal, vector.uniform))
+    if longest < _SMOOTH_FRACTION * float(_lengths(vector.tone[:, 0]).max(initial=0.0)):
+        first = second = 0.0
     if first and first >= second:
         index = int(np.argmax(effects[0]))
         return _Integrated(normal[index], _normal_outside), vector._replace(normal=np.delete(normal, index, axis=0))
@@ -708,7 +713,7 @@ def _effects(mean: Floats, rows: Floats) -> Floats:
 
 
 def _along_longest(vector: _Reduced) -> Floats:
-    """Normal contributions with the same covariance, of which one alone changes the vector in one direction.
+    """Normal contributions with the same covariance, of which only the first changes the vector in one direction.
 
     The direction is that of the mean, or, if the mean is short, that in which the vector varies most.
     """
@@ -730,7 +735,7 @@ def _along_longest(vector: _Reduced) -> Floats:
 def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probability:
     """Probability of the length, integrated over the longest contribution, and over a lattice of the others.
 
-    Only one of `stride` points of the lattice is used.
+    The lattice has 1/`stride` of the usual number of points.
     """
     most = _MAX_MIXTURE_BOUND_COUNT if _is_enumerated(vector) else _MAX_LATTICE_BOUND_COUNT
     longest, sampled = _without_longest(_with_few_bounds(vector, most), confidence)
