@@ -34,16 +34,18 @@ _LINE_SERIES_TERMS = (32, 128, 512, 2048, 8192)
 _PLANE_SERIES_TERMS = (16, 32, 64, 128, 256, 400)
 _LATTICE_POINTS = 2**15
 _CURVE_POINTS = 2**12  # of the lattice in one dimension
-_COARSE_STRIDE_POINTS = 16  # one point of this number gives the first approximation
+_COARSE_STRIDE_POINTS = 16  # the first approximation has fewer points by this factor
 _COUNT_POINTS = 2**17  # of the lattice if no contribution is integrated exactly
 _MAX_BOUND_COUNT = 16  # of bounds of which all signs are tried
-_MAX_MIXTURE_BOUND_COUNT = 12  # beside one other contribution
+_MAX_MIXTURE_BOUND_COUNT = 12  # beside a single contribution of another kind
 _MAX_LATTICE_BOUND_COUNT = 8
 _MAX_CONFIDENCE_PROBABILITY = 1.0 - 1e-8  # at which the points of the lattice are laid out
 _FAR_TAIL_PROBABILITY, _FAR_TAIL_POINTS = 0.9995, 2**16  # for higher confidences the lattice has more points
 _TAIL_PROBABILITY = 0.93  # for higher confidences the points of the lattice are moved outwards
 _QUADRATURE_NODES, _QUADRATURE_END_SIGMA = 48, 8.5
 _TILTED_CELLS = 256
+_SMOOTH_FRACTION = 0.01  # of the longest tone; least length of a contribution that is integrated exactly
+_STRETCHED_COUNT, _STRETCHED_VARIANCE_RATIO = 4, 2.5
 _LATTICE_EXACT_COUNT = 8  # of dimensions; with more, moments of the lattice are corrected
 _MAX_SOLVER_STEPS = 100
 _COARSE_TOLERANCE_FRACTION = 1e-3
@@ -167,7 +169,7 @@ class _Reduced(NamedTuple):
         covariance = self.covariance
         mean_square = float(np.trace(covariance) + self.mean @ self.mean)
         variance = 2.0 * float(np.sum(covariance**2)) + 4.0 * float(self.mean @ covariance @ self.mean)
-        return mean_square, math.sqrt(variance / 9.0) / mean_square
+        return mean_square, max(math.sqrt(variance / 9.0) / mean_square, 1e-12)
 
 
 def _squares(rows: Floats) -> Floats:
@@ -272,7 +274,7 @@ def _tolerance(vector: _Reduced) -> float:
 
 
 def _is_enumerated(vector: _Reduced) -> bool:
-    """Whether the probability is the mean of exact ones over the signs of bounds."""
+    """Whether the probability is the mean of exact probabilities over the signs of bounds."""
     return vector.contributions - len(vector.bound) == 1 and len(vector.bound) <= _MAX_MIXTURE_BOUND_COUNT
 
 
@@ -314,7 +316,7 @@ def _distribution(vector: _Reduced, confidence: float) -> Probability:
 
 def _folded_normal_quantile(mean: float, sigma: float, confidence: float) -> float:
     """Length that a normal number does not exceed, by Newton's method within a bracket."""
-    if sigma == 0.0:
+    if sigma <= _RANK_ROUNDING_FRACTION * mean:
         return mean
     if mean == 0.0:
         return sigma * _half_normal_score(confidence)
@@ -680,12 +682,16 @@ def _tone_outside(low: Floats, high: Floats) -> Floats:
 def _without_longest(vector: _Reduced, confidence: float) -> tuple[_Integrated | None, _Reduced]:
     """Take the contribution with the largest effect that can be integrated exactly from a vector.
 
-    For high confidences that is a normal one, unless the uniform ones are longer than all that it reaches.
+    For high confidences that is a normal contribution, unless a uniform contribution is longer than its quantile.
     """
     normal = _along_longest(vector)
     score = max(NormalDist().inv_cdf(min(confidence, 1.0 - 1e-12)) if confidence else 0.0, math.sqrt(3.0))
     effects = [_effects(vector.mean, normal), _effects(vector.mean, vector.uniform / score)]
     first, second = (float(values.max(initial=0.0)) for values in effects)
+    # Beside a long tone, a short contribution does not make the probability smooth.
+    longest = max(float(_lengths(rows).max(initial=0.0)) for rows in (normal, vector.uniform))
+    if longest < _SMOOTH_FRACTION * float(_lengths(vector.tone[:, 0]).max(initial=0.0)):
+        first = second = 0.0
     if first and first >= second:
         index = int(np.argmax(effects[0]))
         return _Integrated(normal[index], _normal_outside), vector._replace(normal=np.delete(normal, index, axis=0))
@@ -707,7 +713,7 @@ def _effects(mean: Floats, rows: Floats) -> Floats:
 
 
 def _along_longest(vector: _Reduced) -> Floats:
-    """Normal contributions with the same covariance, of which one alone changes the vector in one direction.
+    """Normal contributions with the same covariance, of which only the first changes the vector in one direction.
 
     The direction is that of the mean, or, if the mean is short, that in which the vector varies most.
     """
@@ -729,7 +735,7 @@ def _along_longest(vector: _Reduced) -> Floats:
 def _lattice(vector: _Reduced, confidence: float, stride: int = 1) -> Probability:
     """Probability of the length, integrated over the longest contribution, and over a lattice of the others.
 
-    Only one of `stride` points of the lattice is used.
+    The lattice has 1/`stride` of the usual number of points.
     """
     most = _MAX_MIXTURE_BOUND_COUNT if _is_enumerated(vector) else _MAX_LATTICE_BOUND_COUNT
     longest, sampled = _without_longest(_with_few_bounds(vector, most), confidence)
@@ -819,6 +825,7 @@ class _Tilt(NamedTuple):
 
     exponent: float
     mean: Floats
+    least_variance: float  # of each normal contribution, relative to its own
 
     def of_deviations(self, rows: Floats) -> Floats:
         """Logarithm of the factor for deviations (rows, m)."""
@@ -836,7 +843,9 @@ def _tilt(vector: _Reduced, confidence: float) -> _Tilt:
         middle = 0.5 * (low + high)
         square = sum(value / (1.0 - middle * value) + mean / (1.0 - middle * value) ** 2 for value, mean in terms)
         low, high = (middle, high) if square < length * length else (low, middle)
-    return _Tilt(low, vector.mean)
+    # Few normal contributions beside long uniform ones go farther than the normal vector of the same covariance.
+    is_stretched = confidence > _FAR_TAIL_PROBABILITY and len(vector.normal) <= _STRETCHED_COUNT
+    return _Tilt(low, vector.mean, _STRETCHED_VARIANCE_RATIO if is_stretched else 1.0)
 
 
 def _sampled(vector: _Reduced, points: int, tilt: _Tilt | None) -> tuple[Floats, Floats]:
@@ -866,7 +875,7 @@ def _normal_samples(row: Floats, points: int, tilt: _Tilt | None, column: int) -
     if tilt is None:
         return np.outer(scores, row), None
     variance = 1.0 / (1.0 - tilt.exponent * float(row @ row))
-    spread = math.sqrt(variance)
+    spread = math.sqrt(max(variance, tilt.least_variance))
     tilted = variance * tilt.exponent * float(row @ tilt.mean) + spread * scores
     return np.outer(tilted, row), spread * np.exp(0.5 * (scores**2 - tilted**2))
 

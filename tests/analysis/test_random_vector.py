@@ -239,8 +239,8 @@ class TestSums:
         for confidence, length in zip(CONFIDENCES, case.quantiles(CONFIDENCES), strict=True):
             above = 0.25 * weights @ stats.ncx2.sf(length**2, width, squares) @ weights
             assert above == pytest.approx(
-                1.0 - confidence, rel=1e-3 if width == 2 else 3e-2
-            )  # 3 % are 0.2 % of a length
+                1.0 - confidence, rel=1e-3 if width == 2 else 6e-2
+            )  # 6 % are 0.4 % of a length
 
     @pytest.mark.parametrize("size_of_mean", [0.0, 2.0])
     @pytest.mark.parametrize("counts", [(2, 1, 0, 0), (2, 3, 0, 0), (2, 0, 3, 0), (3, 6, 0, 0), (2, 0, 0, 2)])
@@ -258,7 +258,7 @@ class TestSums:
             (on_lattice,) = random_vector._solve(
                 random_vector._lattice(reduced, confidence), np.array([confidence]), np.array([length]), 1e-6
             )
-            assert on_lattice == pytest.approx(length, rel=3e-3)
+            assert on_lattice == pytest.approx(length, rel=2e-3 if confidence < 0.9999 else 6e-3)
 
     def test_a_line_or_a_plane_in_space_is_reduced(self) -> None:
         turn = np.linalg.qr(np.random.default_rng(1).normal(size=(5, 5)))[0]
@@ -292,6 +292,23 @@ class TestSums:
         scaled = RandomVector(*(scale * rows for rows in case))
         expected = [scale * length for length in case.quantiles(CONFIDENCES)]
         assert scaled.quantiles(CONFIDENCES) == pytest.approx(expected, rel=1e-9)
+
+    def test_contributions_that_vanish_beside_others(self) -> None:
+        """No warning and no number that is not finite, although squares are 0 or infinite."""
+        size = 1e-200
+        for width in (1, 2, 3):
+            rows = size * np.eye(width)
+            tone = np.stack((rows, rows), axis=1)
+            for case in (
+                RandomVector(np.ones(width), rows, rows, rows, tone),
+                RandomVector(np.ones(width), rows, 0.0 * rows, 0.0 * rows, 0.0 * tone),
+                RandomVector(np.ones(width), 0.0 * rows, 0.0 * rows, rows, 0.0 * tone),
+                RandomVector(np.zeros(width), 0.0 * rows, np.eye(width), rows, tone),
+            ):
+                assert all(math.isfinite(length) for length in case.quantiles(CONFIDENCES))
+                assert 0.0 <= case.probability(0.5) <= case.probability(2.0) == pytest.approx(1.0)
+        assert vector((1.0, 2.0), normal=[(1.0, 0.0)]).quantiles([]) == []
+        assert vector((0.0, 0.0, 0.0), uniform=np.eye(3)).quantiles([]) == []
 
     def test_impossible_limits(self) -> None:
         case = mixed(2, (2, 2, 1, 1), 1.0, seed=4)
