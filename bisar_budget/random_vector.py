@@ -92,6 +92,14 @@ class RandomVector(NamedTuple):
     bound: Floats
     tone: Floats
 
+    @classmethod
+    def of_covariance(cls, covariance: Floats) -> "RandomVector":
+        """Make a normal vector with the mean 0 from its covariance (m, m)."""
+        squares, ways = np.linalg.eigh(covariance)
+        nothing = np.zeros((0, len(covariance)))
+        normal = (ways * np.sqrt(np.maximum(squares, 0.0))).T
+        return cls(nothing.sum(axis=0), normal, nothing, nothing, np.zeros((0, 2, len(covariance))))
+
     def probability(self, limit: float) -> float:
         """Probability that the length of the vector is at most a limit, in the unit of the vector."""
         if limit < 0.0:

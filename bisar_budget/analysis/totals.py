@@ -18,7 +18,7 @@ import numpy as np
 
 from bisar_budget.analysis import variables as effects_of
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ErrorVariables, Variable
+from bisar_budget.analysis.variables import CONSTANT, FIRST_HIDDEN_INDEX, ErrorVariables, Variable
 from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
@@ -37,7 +37,6 @@ class Totals:
     def __init__(self, analysis: Analysis) -> None:
         self.analysis, self.errors = analysis, analysis.errors
         self._variables: dict[tuple[str, int], list[Variable]] = {}
-        self._biases: dict[tuple[str, int], dict[str, tuple[float, ...]]] = {}
 
     @cached_property
     def _listing(self) -> ErrorVariables:
@@ -72,11 +71,9 @@ class Totals:
             Gain of autofocus, which multiplies the hidden phase; see `Declared.judged`.
         """
         variables = [each for each in self._of(model, case) if is_member(each.owner)]
-        owners = {source.id: source.owner for source in self.errors.stated}
-        biases = [effects for row_id, effects in self._biases_of(model, case).items() if is_member(owners[row_id])]
-        lengths = [len(effects) for effects in (*biases, *(each.effects for each in variables))]
+        lengths = [len(each.effects) for each in variables]
         columns, weights = _columns(requirement, max(lengths, default=FIRST_HIDDEN_INDEX), plain(gain, case))
-        parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": []}
+        parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": [], CONSTANT: []}
         for variable in variables:
             vector = (
                 _taken(variable.effects, columns) * weights * self._scale(model, requirement, variable, case, gain)
@@ -87,7 +84,7 @@ class Totals:
                 parts["uniform"].append(vector * _UNIFORM_WIDTH)
             else:
                 parts[variable.distribution].append(vector)
-        mean = sum((_taken(effects, columns) * weights for effects in biases), np.zeros(len(columns)))
+        mean = sum(parts.pop(CONSTANT), np.zeros(len(columns)))
         shapes = {"tone": (-1, 2, len(columns))}
         arrays = {
             name: np.array(vectors, dtype=float).reshape(shapes.get(name, (-1, len(columns))))
@@ -136,18 +133,6 @@ class Totals:
                 variables = self._published(variables, case)
             self._variables[model, case] = variables
         return self._variables[model, case]
-
-    def _biases_of(self, model: str, case: int) -> dict[str, tuple[float, ...]]:
-        if (model, case) not in self._biases:
-            biases = self._listing.biases(case) if self.is_biased else {}
-            if model == "published":
-                sources = {source.id: source.in_one_case(case) for source in self.errors.stated}
-                biases = {
-                    row_id: self._published_effects([(sources[row_id], float(sources[row_id].bias))], case)
-                    for row_id in biases
-                }
-            self._biases[model, case] = biases
-        return self._biases[model, case]
 
     def _published(self, variables: Sequence[Variable], case: int) -> list[Variable]:
         """Replace the effects of variables by those of the published model, which hides no phase.

@@ -37,6 +37,7 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, QUADRATIC_OF_VARIANCE, ExactRanges
 
 QUADRATIC, CUBIC, EAST, NORTH = range(4)  # indices of the effects of a variable
+CONSTANT = "constant"  # distribution of a bias
 FIRST_HIDDEN_INDEX = 4  # index of the first part of the hidden phase; all further effects are parts of it too
 
 _EFFECT_COUNT = 8
@@ -66,7 +67,7 @@ class Variable(NamedTuple):
     """One random variable and its effects on the image.
 
     The variable has the mean 0 and the variance 1. If `distribution` is `tone`, the variable is instead the phase ψ
-    of a tone, which is uniform from 0 to 2π.
+    of a tone, which is uniform from 0 to 2π. If it is `constant`, the variable always has the value 1, as for a bias.
 
     `of` is the id of the error, or of the covariance, to which the variable belongs. `parts` are the errors that the
     variable causes if its value is 1, each with its size in the unit of the error. For random errors and tones
@@ -100,6 +101,8 @@ class Variable(NamedTuple):
 
     def covariance(self, index: int, other: int) -> float:
         """Covariance of two effects with the given indices, in the product of their units."""
+        if self.distribution == CONSTANT:
+            return 0.0
         product = self.effects[index] * self.effects[other]
         return (product + self.quadrature[index] * self.quadrature[other]) / 2 if self.is_tone else product
 
@@ -121,11 +124,6 @@ def variables_of(analysis: Analysis, case: int = 0) -> list[Variable]:
     return ErrorVariables(analysis).of(case)
 
 
-def bias_of(analysis: Analysis, case: int = 0) -> dict[str, tuple[float, ...]]:
-    """Effects of the biases of the stated errors in the case with the given index; see `ErrorVariables.biases`."""
-    return ErrorVariables(analysis).biases(case)
-
-
 class ErrorVariables:
     """Independent variables of the declared errors of an analysis, for each of its cases."""
 
@@ -134,22 +132,23 @@ class ErrorVariables:
 
     def of(self, case: int = 0) -> list[Variable]:
         """List the variables in the case with the given index, in a fixed order."""
-        return [*self._of_stated(case), *self._of_random(case), *self._of_vibrations(case), *self._of_tones(case)]
+        return [
+            *self._of_stated(case),
+            *self._of_biases(case),
+            *self._of_random(case),
+            *self._of_vibrations(case),
+            *self._of_tones(case),
+        ]
 
-    def biases(self, case: int = 0) -> dict[str, tuple[float, ...]]:
-        """Effects of the biases of the stated errors in the case with the given index.
+    def _of_biases(self, case: int) -> Iterator[Variable]:
+        """Yield the biases of the stated errors, each a variable of the value 1.
 
-        The keys are the ids of the errors that have a bias. The effects are in the form of `Variable.effects`, and
-        are computed to first order. If a line of sight turns by more than a radian, the part beyond the cubic is
-        exact for a single bias only.
+        If a line of sight turns by more than a radian, the part beyond the cubic is exact for a single bias only.
         """
-        sources = [source.in_one_case(case) for source in self._biased]
-        return {source.id: self._effects([(source, float(source.bias))], case) for source in sources if source.bias}
-
-    @property
-    def _biased(self) -> list[ErrorSource]:
-        """Errors with a bias in at least one case, along the axes in which the mission file states them."""
-        return [source for source in self.analysis.errors.listed if source.is_independent and np.any(source.bias)]
+        for source in self.analysis.errors.stated:
+            if np.any(source.bias) and (bias := plain(source.bias, case)):
+                caused = [(source.in_one_case(case), bias)]
+                yield self._variable(f"{source.id}.bias", source.id, source.owner, CONSTANT, caused, case)
 
     # ---------------------------------------------------------------- stated errors
     def _of_stated(self, case: int) -> Iterator[Variable]:

@@ -130,8 +130,5 @@ def normal_length_ratio(covariance: Floats, confidence: float) -> Floats:
 
 @lru_cache(maxsize=4096)  # cases of a sweep and checks of one mission have the same proportions
 def _length_ratio(variances: tuple[float, ...], confidence: float) -> float:
-    principal = np.diag(np.sqrt(np.maximum(variances, 0.0)))
-    nothing = np.zeros((0, len(variances)))
-    vector = RandomVector(nothing.sum(axis=0), principal, nothing, nothing, np.zeros((0, 2, len(variances))))
-    (quantile,) = vector.quantiles((confidence,))
+    (quantile,) = RandomVector.of_covariance(np.diag(variances)).quantiles((confidence,))
     return quantile

@@ -13,7 +13,8 @@ class Requirement(NamedTuple):
     error leaves no image. `sigma_rss` is the standard uncertainty as the root-sum-square of the errors. `sigma` is
     the standard uncertainty of the draws with an image; it is None if no draw has an image. For displacements
     `sigma_rss` and `sigma` are rms lengths. `probability` is the fraction of draws that meet the requirement;
-    `probability_low` and `probability_high` are the ends of its Wilson interval. `probability_normal` is the
+    `probability_low` and `probability_high` are the ends of its Wilson interval. `probability_computed` is the
+    probability computed without draws, from the distributions of the errors. `probability_normal` is the
     probability for a normal distribution with the variances of the errors. `dominant` is the error with the largest
     share of the variance.
     """
@@ -28,6 +29,7 @@ class Requirement(NamedTuple):
     probability: float
     probability_low: float
     probability_high: float
+    probability_computed: float
     probability_normal: float
     dominant: str
     dominant_share: float

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ToneMotion, Variable
+from bisar_budget.analysis.variables import CONSTANT, FIRST_HIDDEN_INDEX, ToneMotion, Variable
 from bisar_budget.arrays import Floats
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS, UTILIZATION_TOLERANCE_FRACTION
 from bisar_budget.effects.effect import ErrorSource
@@ -560,6 +560,9 @@ class _Stream:
         """Fill an array (draws,) with the next draws of the variable."""
         if self._distribution == "normal":
             self._fill_normal(self._generator, out)
+            return
+        if self._distribution == CONSTANT:
+            out.fill(1.0)
             return
         self._generator.random(out=out)
         if self._distribution == "tone":  # a phase

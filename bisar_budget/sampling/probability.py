@@ -10,7 +10,6 @@ applied. A sinusoidal vibration, and a tone of an oscillator, is drawn with its 
 A wideband vibration is not drawn, because it only spreads power.
 """
 
-import cmath
 import math
 from collections.abc import Iterator, Sequence
 
@@ -21,26 +20,27 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.together import cubics
+from bisar_budget.analysis.totals import Totals
 from bisar_budget.analysis.variables import CUBIC, EAST, NORTH, Variable, variables_of
-from bisar_budget.arrays import Floats
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.effects.declared import QUADRATIC
+from bisar_budget.effects.declared import CUBIC as CUBIC_PHASE
+from bisar_budget.effects.declared import LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
+from bisar_budget.random_vector import RandomVector
 from bisar_budget.sampling.draws import HeldSum, Share, drawing_of, in_turn, joined
 
 CONFIDENCE_LEVEL = 0.95
 DOMINANT_FRACTION = 0.5  # of the variance; an error with a larger share determines the distribution of the sum
+_LIMITED_BY_COLUMN = {0: QUADRATIC, 1: CUBIC_PHASE, 2: LOCATION}  # requirements by their first effect
 _QUANTILE_SIGMA = 1.959963984540054  # of the standard normal at 97.5 %
 _SURE_QUANTILE_SIGMA = 3.2905267314919255  # at 99.95 %, so that a warning is hardly ever due to chance
 _MATERIAL_FRACTION = 0.1  # of the probability of failure; a smaller difference is not worth a warning
 
 _SIGMA_DIGITS = 9  # of sampled sigmas; further digits differ between processors
-_CIRCLE_NODES = 4096  # number of angles for the mean of a smooth function on a circle
-_TALBOT_TERM_COUNT = 20  # of the inversion of a Laplace transform, which then is accurate to about 1e-9
 
 
 def monte_carlo(
@@ -136,7 +136,7 @@ class _Predictions:
     """
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
-        self.together = analysis.together("full")
+        self.together, self.totals = analysis.together("full"), Totals(analysis)
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
@@ -174,69 +174,22 @@ class _Predictions:
         """
         return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
+    def probability(self, judged: HeldSum) -> float:
+        """Probability that the sum of the errors is within the limit, computed from their distributions.
+
+        The effects are of first order in small errors, see `totals`.
+        """
+        vector = self.totals.vector(
+            "full", _LIMITED_BY_COLUMN[judged.columns[0]], judged.owners.__contains__, 0, judged.gain
+        )
+        return vector.probability(judged.limit)
+
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that the sum of the errors is within the limit, for normally distributed errors.
 
         Each error has the same variance as with its declared distribution.
         """
-        covariance = judged.covariance(self.variables)
-        if judged.hides:
-            return _within_limit(judged.limit, covariance)
-        xx, yy, xy = (float(covariance[i, j]) for i, j in ((0, 0), (-1, -1), (0, -1)))
-        if len(judged.columns) == 2:
-            return _within(judged.limit, xx, yy, xy)
-        return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
-
-
-def _within(radius: float, xx: float, yy: float, xy: float) -> float:
-    """Probability that a normal random vector (2,) with mean 0 is no longer than a radius.
-
-    `xx`, `yy` and `xy` are the elements of its covariance matrix. Let r be the radius, a and b the standard
-    deviations along the principal axes, and z a standard normal vector with polar coordinates ρ and θ. The condition
-    |(a z₁, b z₂)| ≤ r is ρ² ≤ r²/(a²cos²θ + b²sin²θ), and ρ² has an exponential distribution. The probability is
-    therefore the mean of a smooth periodic function of θ. A sum over equal steps of θ gives this mean to within
-    rounding errors. For b = 0 the expression is Craig's form of erf.
-    """
-    middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
-    large, small = middle + spread, max(0.0, middle - spread)
-    if not large:
-        return 1.0
-    total = 0.0
-    for step in range(_CIRCLE_NODES):
-        angle = math.pi * (step + 0.5) / _CIRCLE_NODES
-        square = large * math.cos(angle) ** 2 + small * math.sin(angle) ** 2
-        total += math.exp(-(radius**2) / (2 * square)) if square else 0.0
-    return 1 - total / _CIRCLE_NODES
-
-
-def _within_limit(radius: float, covariance: Floats) -> float:
-    """Probability that a normal random vector (n,) with mean 0 is no longer than a radius.
-
-    `covariance` (n, n) is its covariance matrix, with the eigenvalues λ. The squared length has the Laplace transform
-    Π(1 + 2λs)^(−1/2), and its distribution function this transform divided by s. The fixed Talbot method of Abate and
-    Valkó inverts it.
-    """
-    squares: list[float] = [square for square in np.linalg.eigvalsh(covariance).tolist() if square > 0]
-    if not squares:
-        return 1.0
-    scale = max(squares)
-    ratio = 2 * _TALBOT_TERM_COUNT * scale / (5 * radius**2)
-
-    def transformed(s: complex) -> complex:
-        value = 1 / s
-        for square in squares:
-            value /= cmath.sqrt(1 + 2 * square / scale * s)
-        return value
-
-    reach = radius**2 / scale
-    total = 0.5 * math.exp(ratio * reach) * transformed(complex(ratio)).real
-    for term in range(1, _TALBOT_TERM_COUNT):
-        angle = term * math.pi / _TALBOT_TERM_COUNT
-        cotangent = 1 / math.tan(angle)
-        s = ratio * angle * complex(cotangent, 1)
-        slope = complex(1, angle + (angle * cotangent - 1) * cotangent)
-        total += (cmath.exp(reach * s) * transformed(s) * slope).real
-    return min(1.0, max(0.0, ratio / _TALBOT_TERM_COUNT * total))
+        return RandomVector.of_covariance(judged.covariance(self.variables)).probability(judged.limit)
 
 
 def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
@@ -270,6 +223,7 @@ def _requirement(
         probability=holds / draws,
         probability_low=low,
         probability_high=high,
+        probability_computed=predictions.probability(judged),
         probability_normal=predictions.probability_normal(judged),
         dominant=dominant,
         dominant_share=variances[dominant] / variance if variance else 0.0,
@@ -293,7 +247,17 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
             "distribution"
         )
     low, high = _wilson(holds, draws, _SURE_QUANTILE_SIGMA)
-    normal, drawn = requirement.probability_normal, requirement.probability
+    computed, normal, drawn = (
+        requirement.probability_computed,
+        requirement.probability_normal,
+        requirement.probability,
+    )
+    if not low <= computed <= high and abs(computed - drawn) > _MATERIAL_FRACTION * max(1 - computed, 1 - drawn):
+        kind = "optimistic" if computed > drawn else "pessimistic"
+        yield (
+            f"the computed percentiles are {kind}: by them the limit is kept in {100 * computed:.4g} %, in the draws in "
+            f"{100 * drawn:.4g} %; the errors are so large that their effects do not add"
+        )
     fails = max(1 - normal, 1 - drawn)
     if not low <= normal <= high and abs(normal - drawn) > _MATERIAL_FRACTION * fails:
         kind = "optimistic" if normal > drawn else "pessimistic"
