@@ -1,13 +1,13 @@
 """Distributions of the effects of all declared errors together, and their quantiles.
 
-An effect is what a requirement limits: the quadratic phase with its hidden parts, the cubic phase, or the displacement
-of the image on the ground. Each declared error contributes one or more independent random vectors (see `variables`),
-and a bias contributes a constant. A requirement with a confidence p judges the p-quantile of the length of their sum.
-A requirement without a confidence judges the length of the sum of the biases, plus k times the root-sum-square of the
-random parts, where k is the coverage factor.
+An effect is what a requirement limits: the quadratic phase with its hidden parts, the cubic phase, or the
+displacement of the image on the ground. Each declared error contributes one or more independent random vectors, and a
+bias a constant one (see `variables`). A requirement with a confidence p judges the p-quantile of the length of their
+sum. A requirement without a confidence judges the length of the sum of the biases, plus k times the root-sum-square
+of the random parts, where k is the coverage factor.
 
-The vectors are first-order effects. The vector of an error whose effects are not proportional to its size is scaled to
-the effect of its judged size, computed from exact ranges.
+The vectors are first-order effects. The vector of an error whose effects are not proportional to its size is scaled
+to the effect of its judged size, computed from exact ranges.
 """
 
 import math
@@ -122,7 +122,7 @@ class Totals:
         return vector.quantiles(PERCENTILES)
 
     def probability(self, model: str, requirement: str, limit: float, case: int) -> float:
-        """Probability that the effect of all errors, drawn together, keeps a limit, in the unit of the requirement."""
+        """Probability that the effect of all errors, drawn together, keeps a limit, in its unit."""
         return self.vector(model, requirement, lambda owner: True, case).probability(limit)
 
     # ---------------------------------------------------------------- variables of a model

@@ -206,9 +206,7 @@ class ErrorVariables:
         """
         errors = self.analysis.errors
         return {
-            source.id: self.exact.range_error(errors.lanes(source))
-            for source in (*errors.stated, *self._biased)
-            if source.displaces
+            source.id: self.exact.range_error(errors.lanes(source)) for source in errors.stated if source.displaces
         }
 
     def _column(self, case: int) -> int:

@@ -110,10 +110,6 @@ _TIME_TAG_ERROR = WithBias(TIME_TAG, "TimeTagError")
 PART_REFERENCES = either(list, TextList(), Reference())
 
 
-Biases = Mapping[str, SectionValue]
-"""Biases of errors by the keys of these errors: a vector along the axes of a frame, or a number; None if not stated."""
-
-
 def distribution_for(distribution: str | Distributions, kind: str) -> str:
     """Distribution of the error of a `kind`, such as `velocity`; a mapping does not apply to other kinds of error."""
     if isinstance(distribution, str):
@@ -136,7 +132,8 @@ class MotionError(NamedTuple):
 
     `of_parts` contains the figures that come from parts of the catalogue or from the source of the path, as pairs of
     the figure's name and its source. `overridden` lists figures of parts, and of the source of the path, that are
-    replaced by keys of the mission file. `bias` has the biases along the axes of the frame, by the kind of error.
+    replaced by keys of the mission file. `bias` has the biases by the keys of the errors: a vector along the axes of
+    the frame, or a number, or None.
     """
 
     frame: Annotated[
@@ -193,7 +190,7 @@ class MotionError(NamedTuple):
     source: Source = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
-    bias: Biases = {}
+    bias: Mapping[str, SectionValue] = {}
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -305,7 +302,7 @@ class CommonMotionError(NamedTuple):
         ),
     ] = None
     source: Source = None
-    bias: Biases = {}
+    bias: Mapping[str, SectionValue] = {}
 
     def stated(self, kind: str) -> Vector | None:
         """Error of the given `kind` along the axes of the frame; 0 if only its bias is stated."""

@@ -21,7 +21,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.together import cubics
 from bisar_budget.analysis.totals import Totals
-from bisar_budget.analysis.variables import CUBIC, EAST, NORTH, Variable, variables_of
+from bisar_budget.analysis.variables import CONSTANT, CUBIC, EAST, NORTH, Variable, variables_of
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.declared import CUBIC as CUBIC_PHASE
 from bisar_budget.effects.declared import LOCATION, QUADRATIC
@@ -172,7 +172,7 @@ class _Predictions:
 
         This is always the case for a covariance. `name` is the id of the error or covariance.
         """
-        return all(v.distribution == "normal" for v in self.variables if v.of == name)
+        return all(v.distribution in ("normal", CONSTANT) for v in self.variables if v.of == name)
 
     def probability(self, judged: HeldSum) -> float:
         """Probability that the sum of the errors is within the limit, computed from their distributions.
@@ -255,7 +255,7 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
     if not low <= computed <= high and abs(computed - drawn) > _MATERIAL_FRACTION * max(1 - computed, 1 - drawn):
         kind = "optimistic" if computed > drawn else "pessimistic"
         yield (
-            f"the computed percentiles are {kind}: by them the limit is kept in {100 * computed:.4g} %, in the draws in "
+            f"the computed percentiles are {kind}: they keep the limit in {100 * computed:.4g} %, the draws in "
             f"{100 * drawn:.4g} %; the errors are so large that their effects do not add"
         )
     fails = max(1 - normal, 1 - drawn)

@@ -12,7 +12,7 @@ import yaml
 
 import bisar_budget as bb
 from bisar_budget.analysis.analysis import Analysis, by_nodes
-from bisar_budget.analysis.variables import FIRST_HIDDEN_INDEX, ErrorVariables, Variable, bias_of, variables_of
+from bisar_budget.analysis.variables import CONSTANT, FIRST_HIDDEN_INDEX, ErrorVariables, Variable, variables_of
 from bisar_budget.effects.slow_tones import TONE_PHASES_RAD
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.stacked import stacked
@@ -186,10 +186,10 @@ def test_variables_of_each_of_many_cases_are_those_of_its_mission() -> None:
 
 def test_a_bias_has_the_effects_of_an_error_of_its_size() -> None:
     analysis = Analysis(load_mission(mission_file("dvbt_aircraft")))
-    (index,) = (i for i, one in enumerate(analysis.errors.listed) if one.is_independent and one.declared)
-    assert bias_of(analysis) == {}
-    source = analysis.errors.listed[index]
-    analysis.errors.listed[index] = source._replace(bias=-2 * source.declared)
-    (variable,) = (one for one in variables_of(analysis) if one.of == source.id)
-    (bias,) = bias_of(analysis).values()
-    assert np.array(bias) == pytest.approx(-2 * np.array(variable.effects), rel=1e-9)
+    (index,) = (i for i, one in enumerate(analysis.errors.stated) if one.declared)
+    assert all(variable.distribution != CONSTANT for variable in variables_of(analysis))
+    source = analysis.errors.stated[index]
+    analysis.errors.stated[index] = source._replace(bias=-2 * source.declared)
+    variable, bias = (one for one in variables_of(analysis) if one.of == source.id)
+    assert bias.distribution == CONSTANT
+    assert np.array(bias.effects) == pytest.approx(-2 * np.array(variable.effects), rel=1e-9)
