@@ -1,4 +1,4 @@
-"""Reader of the requirements file of a mission: a CSV file with the columns id, text, key and limit.
+"""Reader of the requirements file of a mission: a CSV file with the columns id, text, key, limit and confidence.
 
 The values are put into the tree of the mission file. The mission is then the same as if the mission file stated them
 under the keys `requirements`, `requirement_ids` and `requirement_texts`.
@@ -25,13 +25,22 @@ from bisar_budget.faults import (
 )
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Requirements, id_of_requirement
-from bisar_budget.mission.readers import INVALID, Reader, Section, Statement, Text, did_you_mean
+from bisar_budget.mission.readers import (
+    INVALID,
+    Level,
+    Reader,
+    Section,
+    Statement,
+    Text,
+    WithConfidence,
+    did_you_mean,
+)
 from bisar_budget.mission.tree import MAX_BYTES, Tree
 from bisar_budget.paths.flight import PathFileError
 
 COLUMNS = ("id", "text", "key", "limit")
 FILE_KEY: KeyPath = ("requirements", "file")
-_CONFIDENCE = "confidence"  # column for a confidence level of each limit, which the tool does not have yet
+_CONFIDENCE = "confidence"  # column that a file may have: the probability with which each limit is kept
 _LIMITS: dict[str, Reader[object]] = {
     key: entry.reader for key, entry in Section(Requirements).keys.items() if key != FILE_KEY[-1]
 }
@@ -60,6 +69,7 @@ class RequirementEntry(NamedTuple):
     text: Cell
     key: Cell
     limit: Cell
+    confidence: Cell
 
 
 # ---------------------------------------------------------------------- CSV
@@ -175,17 +185,12 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
         accepted = "accepted: a cell that begins and ends with one, with doubled marks inside"
         faults.at(unclosed[0], "", "begins with a quotation mark that the cell does not close", accepted)
     by_name = {name: cells[index] if index < len(cells) else behind for name, index in columns.items()}
-    line = RequirementEntry(*(_without_apostrophe(by_name[name]) for name in COLUMNS))
+    line = RequirementEntry(*(_without_apostrophe(by_name.get(name, behind)) for name in (*COLUMNS, _CONFIDENCE)))
     if not any(cell.text for cell in line):
         return None  # only columns that are not used have text
     key = line.key.text.removeprefix("requirements.").removeprefix("requirement.")
     key = key if key in _LIMITS else line.key.text
     line = line._replace(key=line.key._replace(text=key))
-    if confidence := by_name.get(_CONFIDENCE, behind).text:
-        problem = "a confidence for each limit is not there yet"
-        faults.at(
-            by_name[_CONFIDENCE], _CONFIDENCE, problem, "accepted: an empty cell, or no such column", "", confidence
-        )
     for cell, name, reader in ((line.id, "id", Text()), (line.text, "text", Statement())):
         if cell.text:
             reader.read(cell.text, (), faults.of(cell, name))
@@ -201,11 +206,30 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
             f"{printable(key)} is the id of a row, which has no limit of its own",
             "accepted: an empty cell",
         )
-    elif line.limit.text:
-        _LIMITS[key].read(_written(line), (), faults.of(line.limit, "limit"))
+    elif line.limit.text or line.confidence.text:
+        _report_limit(line, faults)
     if not line.id.text and (key not in _LIMITS or line.text.text or not line.limit.text):
         faults.at(line.id, "id", "is missing", "accepted: the id of a requirement of the project")
     return line if len(faults.faults) == count else None
+
+
+def _report_limit(line: RequirementEntry, faults: _Faults) -> None:
+    """Record the faults of the limit and the confidence of a line, each at its cell."""
+    key = line.key.text
+    if not line.confidence.text:
+        _LIMITS[key].read(_written(line), (), faults.of(line.limit, "limit"))
+    elif not isinstance(_LIMITS[key], WithConfidence):
+        level = "is an expectation over all errors, and " if isinstance(_LIMITS[key], Level) else ""
+        problem = f"{printable(key)} {level}has no confidence"
+        faults.at(line.confidence, _CONFIDENCE, problem, "accepted: an empty cell")
+    else:
+
+        def report(path: KeyPath, problem: Problem) -> None:
+            is_confidence = path[-1:] == (_CONFIDENCE,)
+            cell, column = (line.confidence, _CONFIDENCE) if is_confidence else (line.limit, "limit")
+            faults.of(cell, column)(path, problem)
+
+        _LIMITS[key].read(_written(line), (), report)
 
 
 def _without_apostrophe(cell: Cell) -> Cell:
@@ -213,8 +237,14 @@ def _without_apostrophe(cell: Cell) -> Cell:
     return cell._replace(text=cell.text[1:]) if re.match("'[-+=@]", cell.text) else cell
 
 
-def _written(line: RequirementEntry) -> str | list[str]:
-    """Limit of a line as a mission file would state it: a string, or a list of strings for the key `declare`."""
+def _written(line: RequirementEntry) -> str | list[str] | dict[str, str]:
+    """Limit of a line as a mission file would state it.
+
+    It is a string, a list of strings for the key `declare`, or a section if the line has a confidence.
+    """
+    if line.confidence.text:
+        limit = {"limit": line.limit.text} if line.limit.text else {}
+        return {**limit, _CONFIDENCE: line.confidence.text}
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text
@@ -230,7 +260,7 @@ def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
     limits: dict[str, RequirementEntry] = {}
     texts: dict[str, RequirementEntry] = {}
     for line in lines:
-        if line.limit.text:
+        if line.limit.text or line.confidence.text:
             first = limits.setdefault(line.key.text, line)
             if _limit(first) != _limit(line):
                 problem = f"{line.key.text} has another limit in line {first.limit.line}, {shown(first.limit.text)}"
@@ -280,7 +310,7 @@ class _Into:
     def add(self, line: RequirementEntry) -> None:
         """Put the limit, id and text of a line into the tree; it is a fault if the mission file has another value."""
         key, is_limited = line.key.text, line.key.text in _LIMITS
-        if is_limited and line.limit.text:
+        if is_limited and (line.limit.text or line.confidence.text):
             self._limit(key, line)
         row_id = id_of_requirement(key) if is_limited else key
         if line.id.text:
@@ -312,6 +342,9 @@ class _Into:
         section[key] = _written(line)
         self.added.add(path)
         self._put(path, line.limit.text)
+        if line.confidence.text:
+            self._put((*path, "limit"), line.limit.text)
+            self._put((*path, _CONFIDENCE), line.confidence.text)
 
     def _id(self, row_id: str, own_id: str) -> None:
         section, path = self._section("requirement_ids"), ("requirement_ids", row_id)

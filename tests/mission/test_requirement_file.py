@@ -1,6 +1,7 @@
 """Requirements of a mission from a CSV file."""
 
 import json
+import math
 import re
 import subprocess
 from pathlib import Path
@@ -233,13 +234,37 @@ class TestFaults:
         )
 
     @pytest.mark.parametrize("level", ["95 %", "0.95"])
-    def test_a_confidence_is_refused(self, stated, level) -> None:
-        (fault,) = faults(stated(f"id,text,key,limit,confidence\nA,,location_error,5 m,{level}\n"))
-        assert fault == (
-            "requirements.file: reqs.csv:2:23: confidence: a confidence for each limit is not there yet "
-            f"(got {level}); accepted: an empty cell, or no such column"
-        )
-        load_mission(str(stated("id,text,key,limit,confidence\nA,,location_error,5 m,\n")))
+    def test_a_confidence_is_that_of_the_limit(self, stated, level) -> None:
+        needs = load_mission(
+            str(stated(f"id,text,key,limit,confidence\nA,,location_error,5 m,{level}\n"))
+        ).requirements
+        assert (needs.location_error, needs.confidence_of("location_error")) == (5.0, 0.95)
+        needs = load_mission(str(stated("id,text,key,limit,confidence\nA,,location_error,5 m,\n"))).requirements
+        assert (needs.location_error, needs.confidence_of("location_error")) == (5.0, None)
+
+    def test_a_confidence_may_stand_beside_the_default_limit(self, stated) -> None:
+        needs = load_mission(
+            str(stated("id,text,key,limit,confidence\nA,,quadratic_phase_error,,90 %\n"))
+        ).requirements
+        assert needs.quadratic_phase_error == math.pi / 4
+        assert needs.confidence_of("quadratic_phase_error") == 0.9
+
+    @pytest.mark.parametrize(
+        ("line", "fault"),
+        [
+            ("A,,location_error,5 m,95", "2:23: confidence: must be a probability from 50 % to 99.9999 % (got 95)"),
+            ("A,,location_error,5 kg,95 %", "2:19: limit: has the unknown unit 'kg'"),
+            (
+                "A,,islr,-20 dB,95 %",
+                "2:16: confidence: islr is an expectation over all errors, and has no confidence",
+            ),
+            ("A,,cubic_phase_error,,95 %", "2:22: limit: is missing"),
+            ("A,,declare,position,95 %", "2:21: confidence: declare has no confidence"),
+        ],
+    )
+    def test_a_confidence_that_cannot_be_used_names_its_cell(self, stated, line, fault) -> None:
+        (first, *_) = faults(stated(f"id,text,key,limit,confidence\n{line}\n"))
+        assert first.startswith(f"requirements.file: reqs.csv:{fault}")
 
     @pytest.mark.parametrize(
         ("csv", "fault"),
