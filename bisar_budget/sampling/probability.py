@@ -31,7 +31,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
 from bisar_budget.random_vector import RandomVector
-from bisar_budget.sampling.draws import HeldSum, Share, drawing_of, in_turn, joined
+from bisar_budget.sampling.draws import Drawing, HeldSum, Share, drawing_of, in_turn, joined
 
 CONFIDENCE_LEVEL = 0.95
 DOMINANT_FRACTION = 0.5  # of the variance; an error with a larger share determines the distribution of the sum
@@ -80,7 +80,7 @@ def monte_carlo(
     holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
-        _requirement(*counted, draws, predictions) for counted in zip(judged, holds, mean_squares, strict=True)
+        _requirement(*counted, drawing, predictions) for counted in zip(judged, holds, mean_squares, strict=True)
     )
     low, high = _wilson(all_hold, draws, _QUANTILE_SIGMA) if judged else (None, None)
     return MonteCarlo(
@@ -206,8 +206,9 @@ def _wilson(successes: int, draws: int, quantile: float) -> tuple[float, float]:
 
 
 def _requirement(
-    judged: HeldSum, holds: int, mean_square: float, draws: int, predictions: _Predictions
+    judged: HeldSum, holds: int, mean_square: float, drawing: Drawing, predictions: _Predictions
 ) -> Requirement:
+    draws = drawing.draws
     variances = predictions.variances(judged)
     variance = math.fsum(variances.values())
     dominant = max(variances, key=lambda name: variances[name])
@@ -229,15 +230,16 @@ def _requirement(
         dominant_share=variances[dominant] / variance if variance else 0.0,
         warnings=(),
     )
-    return requirement._replace(warnings=tuple(_doubts(requirement, holds, draws, predictions)))
+    return requirement._replace(warnings=tuple(_doubts(requirement, holds, drawing, predictions)))
 
 
-def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
+def _doubts(requirement: Requirement, holds: int, drawing: Drawing, predictions: _Predictions) -> Iterator[str]:
     """Yield warnings if root-sum-square or a normal distribution is a poor description of the summed errors.
 
     `requirement` limits the sum of these errors. There is a warning if an error that is not normally distributed
     dominates the variance, or if the probability for a normal distribution differs clearly from the result of the
-    draws.
+    draws. There is also a warning if draws from exact ranges differ clearly from the computed distribution, in which
+    effects are proportional to errors.
     """
     # A covariance, which is no single variable, is always normal.
     if requirement.dominant_share > DOMINANT_FRACTION and not predictions.is_normal(requirement.dominant):
@@ -246,13 +248,17 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
             "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal "
             "distribution"
         )
-    low, high = _wilson(holds, draws, _SURE_QUANTILE_SIGMA)
+    low, high = _wilson(holds, drawing.draws, _SURE_QUANTILE_SIGMA)
     computed, normal, drawn = (
         requirement.probability_computed,
         requirement.probability_normal,
         requirement.probability,
     )
-    if not low <= computed <= high and abs(computed - drawn) > _MATERIAL_FRACTION * max(1 - computed, 1 - drawn):
+    if (
+        drawing.is_exact
+        and not low <= computed <= high
+        and abs(computed - drawn) > _MATERIAL_FRACTION * max(1 - computed, 1 - drawn)
+    ):
         kind = "optimistic" if computed > drawn else "pessimistic"
         yield (
             f"the computed percentiles are {kind}: they keep the limit in {100 * computed:.4g} %, the draws in "

@@ -337,4 +337,5 @@ def test_lines_are_read_with_their_places() -> None:
         ("x", 2, 5),
         ("islr", 2, 7),
         ("-3 dB", 2, 13),
+        ("", 2, 18),
     ]

@@ -16,7 +16,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.sampling import draws as drawing
-from bisar_budget.sampling.probability import _wilson, _within, monte_carlo
+from bisar_budget.sampling.probability import _wilson, monte_carlo
 from tests import reference
 from tests.cli.test_settings import project, table  # noqa: F401
 from tests.conftest import examples, findings, mission_text, row
@@ -215,17 +215,6 @@ class TestStatistics:
         assert _wilson(successes, draws, 1.959963984540054) == pytest.approx((low, high), abs=5e-5)
         mirrored = _wilson(draws - successes, draws, 1.959963984540054)
         assert mirrored == pytest.approx((1 - high, 1 - low), abs=5e-5)
-
-    def test_within_a_circle(self) -> None:
-        assert _within(2.0, 1.0, 1.0, 0.0) == pytest.approx(1 - math.exp(-2), rel=1e-12)
-        assert _within(2.0, 1.0, 0.0, 0.0) == pytest.approx(phi(2), rel=1e-9)  # Craig
-        assert _within(2.0, 0.5, 0.5, 0.5) == pytest.approx(phi(2), rel=1e-9)  # the same line, turned
-        assert _within(1.0, 0.0, 0.0, 0.0) == 1.0
-        c = np.array([[3.0, 1.2], [1.2, 0.6]])
-        lengths = np.hypot(*np.random.default_rng(1).multivariate_normal([0, 0], c, 400_000).T)
-        for radius in (0.3, 1.0, 3.0):
-            share = float(np.mean(lengths <= radius))
-            assert _within(radius, 3.0, 0.6, 1.2) == pytest.approx(share, abs=4 * math.sqrt(0.25 / 400_000))
 
     def test_doubt_needs_a_sure_and_a_material_difference(self) -> None:
         """Normal errors raise none, whatever the seed; forty declared phases are a lattice, no normal one."""
