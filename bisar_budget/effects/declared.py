@@ -1030,7 +1030,7 @@ class Model:
             of_all = np.full(block.declared.shape, math.nan)
             of_all[index] = math.nan if limit is None else limit
             limits_of_block.append(None if limit is None else of_all)
-        allowed_of_block = block.allowed(self.name, limits_of_block, is_complete=False)
+        allowed_of_block = block.reaching(self.name, limits_of_block, is_complete=False)
         size, binding = plain(allowed_of_block.smallest[index]), int(allowed_of_block.binding[index, 0])
         return (None, None) if math.isnan(size) else (size, (*LIMITING_REQUIREMENTS, END_OF_IMAGE)[binding])
 

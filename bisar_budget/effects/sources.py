@@ -76,6 +76,12 @@ def distribution_of(mission: Mission, source: ErrorSource) -> str:
     return error.distribution_of(source.kind.name)
 
 
+def _bias(biases: Mapping[str, PerCase | None], key: str) -> PerCase:
+    """Bias of an error, 0 if the file states none."""
+    bias = biases.get(key)
+    return 0.0 if bias is None else bias
+
+
 # The evaluators accept and return numbers, or arrays of cases.
 _published_motion: Callable[..., tuple[tuple[PerCase, ...], ...]] = evaluators.published_motion
 
@@ -293,7 +299,7 @@ class ErrorListing:
                 )
                 terms = TIMING_KIND.clock_size(term).terms()
                 error = self._of_terms(row_subject, value, terms, no_limit, is_heard=is_heard)
-                yield error._replace(bias=timing.bias.get(term) or 0.0)
+                yield error._replace(bias=_bias(timing.bias, term))
         yield from self._of_setting()
         for name in PLATFORMS:
             yield from self._of_aging(name)
@@ -474,12 +480,12 @@ class ErrorListing:
             error: MotionError = getattr(self.mission.platforms, name).motion_error
             if error.tag is not None:
                 tag = self._of_time_tag(name, (platform_index,), error.tag, error.source)
-                yield tag._replace(bias=error.bias.get(TIME_TAG_KIND.name) or 0.0)
+                yield tag._replace(bias=_bias(error.bias, TIME_TAG_KIND.name))
         common = self.mission.common_motion_error
         if common is not None and common.tag is not None:
             note = phrases.note("held-to-the-total", owners="both platforms")
             tag = self._of_time_tag("mission", (0, 1), common.tag, common.source, note)
-            yield tag._replace(bias=common.bias.get(TIME_TAG_KIND.name) or 0.0)
+            yield tag._replace(bias=_bias(common.bias, TIME_TAG_KIND.name))
 
     def _of_time_tag(
         self,

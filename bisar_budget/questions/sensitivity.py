@@ -21,6 +21,7 @@ from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import IS_JUDGED
 from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
 from bisar_budget.error_kinds.path_kinds import TIME_TAG_KIND
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Outside
@@ -420,7 +421,7 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
     common, air = mission.common_motion_error, mission.propagation
     sections.append(("common_motion_error", common, (*MOTION, TIME_TAG_KIND.name), 0))
     sections.append(("common_motion_error.random", None, (), 0 if common is None else len(common.random)))
-    sections.append(("timing_error", mission.timing_error, mission.timing_error._fields, 0))
+    sections.append(("timing_error", mission.timing_error, tuple(TIMING_KIND.sizes), 0))
     sections.append(("propagation", air, (*PLATFORMS, *DELAYS), 0))
     sections.append(("other_errors", None, (), len(mission.other_errors)))
     for key, section, names, count in sections:

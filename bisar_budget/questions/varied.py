@@ -51,6 +51,7 @@ from bisar_budget.mission.platforms import (
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.readers import (
+    CONFIDENCE_FIELD,
     ListOf,
     OneOf,
     Quantity,
@@ -71,7 +72,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
 
     `is_stated` tells whether the file states the number. An array cannot replace a number from which other content of
     the mission is derived. Such numbers belong to an orbit or a log, to the position of the scene on the Earth, to
-    the orientation of the Earth, or to a covariance matrix.
+    the orientation of the Earth, or to a covariance matrix. A confidence is part of the form of a mission.
     """
     section, *steps = parts_of(key)
     if section == "platforms":
@@ -83,7 +84,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
                 return False  # the noise of a part holds at the part's frequency
             return is_stated or steps[2] in _OPTIONAL_OSCILLATOR_SIZES
         return not flies_on_earth(mission) and _is_held_of_path(platform, steps[1], is_stated)
-    if section == "earth_orientation":
+    if section == "earth_orientation" or steps[-1:] == [CONFIDENCE_FIELD]:
         return False
     if key == "collection.aperture_time" or (section == "scene" and steps[0] in PLACE_KEYS):
         return not flies_on_earth(mission)

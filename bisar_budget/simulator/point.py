@@ -402,7 +402,8 @@ def declared_errors(mission: Mission) -> Errors:
     """Declared errors of a mission as they occur together in one flight.
 
     They have the signs, the seed and the coverage factor of the mission file. A covariance has no sign. It is
-    represented by the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor.
+    represented by the most probable error with a quadratic phase of one sigma, multiplied by the coverage factor. A
+    bias is added with its own sign.
     """
     analysis = Analysis(mission)
     sizes = {source.id: source.declared for source in analysis.stated if source.displaces}
@@ -410,7 +411,7 @@ def declared_errors(mission: Mission) -> Errors:
     for group in correlated_errors(mission):
         likely_sizes = likely_error(group, [sources[row_id] for row_id in group.ids])
         sizes |= dict(zip(group.ids, likely_sizes, strict=True))
-    declared = [(sources[row_id], size) for row_id, size in sizes.items()]
+    declared = [(sources[row_id], size + sources[row_id].bias) for row_id, size in sizes.items()]
     of_known_motion = flown_together(declared, mission.geometry, mission.collection.aperture_time)
     errors = superposed((of_known_motion, drawn_errors(analysis)))
     for name in PLATFORMS:
