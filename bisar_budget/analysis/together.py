@@ -105,19 +105,25 @@ class Together:
         for error in self.random:
             if error.declared is not None:
                 effect, coverage = self._effect(error), error.coverage(self.errors.mission)
-                quadratic, cubic, hidden = (
-                    array(phase_part * error.declared)
-                    for phase_part in (effect.quadratic, effect.cubic, effect.hidden)
-                )
+                quadratic, cubic, hidden = map(array, (effect.quadratic, effect.cubic, effect.hidden))
                 phase = DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage)
                 rms_cubic = array(error.effect(self.model).cubic * error.declared) / coverage
+                if error.biased is not None:
+                    rms_cubic = np.hypot(rms_cubic, array(error.biased.sizes(self.model, 1.0)[1]))
                 yield phase._replace(hidden_rad=hidden, rms_cubic_rad=rms_cubic)
 
     def _effect(self, error: RandomError) -> RandomEffect:
-        """Effect of one unit of a random error in the form in which the mission's rule combines it; see `_does`."""
-        if self.rule == "rss":
-            return error.effect(self.model)
-        return error.judged_effect(self.model, self.errors.mission.requirements.confidence_of, self.errors.gain)
+        """Effect of a declared random error in the form in which the mission's rule combines it; see `_does`."""
+        if self.rule != "rss":
+            return error.judged(self.model, self.errors.mission.requirements.confidence_of, self.errors.gain)
+        effect = error.effect(self.model)
+        return effect._replace(
+            quadratic=effect.quadratic * error.declared,
+            hidden=effect.hidden * error.declared,
+            cubic=effect.cubic * error.declared,
+            east=effect.east * error.declared,
+            north=effect.north * error.declared,
+        )
 
     def _phases_of_stated(self) -> Iterator[DeclaredPhase]:
         factor = self.errors.mission.allocation.coverage_factor
@@ -260,7 +266,7 @@ class Together:
             if error.declared is not None:
                 effect = self._effect(error)
                 is_open = self.errors.array(error.displaces_unknown) > 0
-                moved = (self.errors.array(component * error.declared) for component in effect[3:5])
+                moved = map(self.errors.array, effect[3:5])
                 east, north = (np.where(is_open, 0.0, component) for component in moved)
                 moves.append((error.subject.id, (east, north)))
         return moves

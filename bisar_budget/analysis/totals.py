@@ -45,7 +45,9 @@ class Totals:
     @cached_property
     def is_biased(self) -> bool:
         """Whether any declared error has a bias."""
-        return any(np.any(source.bias) for source in self.errors.stated)
+        return any(np.any(source.bias) for source in self.errors.stated) or any(
+            error.biased is not None for error in self.analysis.random
+        )
 
     def is_asked(self, requirement: str) -> bool:
         """Whether a requirement judges anything but the declared sizes: a confidence, or biases."""
@@ -145,6 +147,10 @@ class Totals:
         for error in self.analysis.random:
             if error.declared is None or error.counted_in:
                 continue
+            if error.biased is not None:
+                bias = error.biased.of(case)
+                effects = tuple((bias.bias * np.nan_to_num(bias.published[:, 0])).tolist())
+                published.append(Variable(f"{error.id}.bias", error.id, error.owner, CONSTANT, (), effects))
             effect, size = error.published.of(case), plain(error.declared, case)
             size /= plain(error.coverage(self.analysis.mission), case)
             distribution = "normal" if error.is_covered else "bound"

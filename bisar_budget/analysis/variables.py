@@ -141,7 +141,7 @@ class ErrorVariables:
         ]
 
     def _of_biases(self, case: int) -> Iterator[Variable]:
-        """Yield the biases of the stated errors, each a variable of the value 1.
+        """Yield the biases of the declared errors, each a variable of the value 1.
 
         If a line of sight turns by more than a radian, the part beyond the cubic is exact for a single bias only.
         """
@@ -149,6 +149,12 @@ class ErrorVariables:
             if np.any(source.bias) and (bias := plain(source.bias, case)):
                 caused = [(source.in_one_case(case), bias)]
                 yield self._variable(f"{source.id}.bias", source.id, source.owner, CONSTANT, caused, case)
+        further = (0.0,) * (_TURNED_PART_COUNT * bool(self.exact.is_turned[self._column(case)]))
+        for error in self.analysis.random:
+            if error.biased is not None and not error.counted_in:
+                one = error.biased.of(case)
+                effects = (*(one.bias * one.full[:, 0]).tolist(), *further)
+                yield Variable(f"{error.id}.bias", error.id, error.owner, CONSTANT, (), effects)
 
     # ---------------------------------------------------------------- stated errors
     def _of_stated(self, case: int) -> Iterator[Variable]:

@@ -163,8 +163,12 @@ class RandomRows:
         )
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
-    def _sizes(self, model: str, effects: RandomEffect, judged_effects: RandomEffect) -> Floats:
+    def _sizes(
+        self, model: str, effects: RandomEffect, judged_effects: RandomEffect, declared: Floats
+    ) -> tuple[Floats, Floats | None]:
         """Compute the size at which each error reaches the limit of each requirement, (requirements, errors, cases).
+
+        The utilizations (errors, cases) follow, if an error has a bias, and otherwise None.
 
         The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect. `effects`
         are those of one unit at one sigma, and `judged_effects` those at the quantiles of the requirements.
@@ -180,7 +184,31 @@ class RandomRows:
         held = held_effect(self.mission, effects, coverage, gain, judged_effects)
         for row, size in zip(sizes, sizes_at(held, limits), strict=True):
             row[:] = size
-        return sizes
+        return sizes, self._with_biases(model, limits, sizes, declared)
+
+    def _with_biases(self, model: str, limits: Limits, sizes: Floats, declared: Floats) -> Floats | None:
+        """Replace the sizes of errors with a bias, and compute the utilizations of all errors, (errors, cases).
+
+        `sizes` (requirements, errors, cases) changes in place. The result is None if no error has a bias.
+        """
+        if not any(error.biased for error in self.errors):
+            return None
+        with np.errstate(all="ignore"):
+            uses = np.where(np.isnan(declared), math.nan, declared / sizes.min(axis=0))
+        confidence_of, gain = self.mission.requirements.confidence_of, self.allocation.autofocus_gain
+        places = [RANDOM_REQUIREMENTS.index(key) for key in (QUADRATIC, CUBIC, LOCATION)]
+        for index, error in enumerate(self.errors):
+            if error.biased is not None:
+                of_error = [
+                    None if limit is None else limit[index]
+                    for limit in (limits.quadratic, limits.cubic, limits.displacement)
+                ]
+                uses[index], of_random_part = error.uses(model, of_error, confidence_of, gain)
+                for place, size in zip(places, of_random_part, strict=True):
+                    sizes[place, index] = size
+                spread = sizes[RANDOM_REQUIREMENTS.index(ISLR), index]
+                uses[index] = np.maximum(uses[index], declared[index] / spread)
+        return uses
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
         """Yield the rows of all random errors, declared or not, as judged by the model `published` or `full`."""
@@ -191,9 +219,9 @@ class RandomRows:
         judged_by_mine, judged_by_theirs = mine, theirs
         if self.mission.requirements.has_confidence:
             judged_by_mine, judged_by_theirs = (self._effects(name, is_judged=True) for name in (model, other_model))
-        sizes = self._sizes(model, mine, judged_by_mine)
-        sizes_of_other = self._sizes(other_model, theirs, judged_by_theirs)
         declared = self._table([math.nan if error.declared is None else error.declared for error in self.errors])
+        sizes, uses = self._sizes(model, mine, judged_by_mine, declared)
+        sizes_of_other, uses_of_other = self._sizes(other_model, theirs, judged_by_theirs, declared)
         allocation, smallest, combine = self.allocation, sizes.min(axis=0), self.mission.allocation.combine
         gain = allocation.autofocus_gain
         is_open = self._table([_is_open(self.mission, error) for error in self.errors]) > 0
@@ -207,11 +235,14 @@ class RandomRows:
         within = qpe / limit
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
         is_over_other = declared > sizes_of_other.min(axis=0) * LIMIT_RATIO
+        if uses_of_other is not None:
+            is_over_other = uses_of_other > LIMIT_RATIO
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
         is_continued = self._rests_on_masks(mine, sizes)
         in_doubt = self._table([error.is_in_doubt for error in self.errors]) > 0
         with np.errstate(all="ignore"):
             use = declared / allowable
+        use = use if uses is None else uses
         is_in_doubt = in_doubt & (use > MIN_USE_FRACTION) & ~(use > LIMIT_RATIO)
         judged = self.judging.row(
             self.errors[0].subject,
@@ -222,6 +253,7 @@ class RandomRows:
             is_info=(self._table([combine != "each" or bool(error.counted_in) for error in self.errors]) > 0)
             & ~is_open,
             is_unknown=is_open | is_in_doubt,
+            use=uses,
         )._replace(
             binding=np.array([-1, *map(REQUIREMENTS.index, RANDOM_REQUIREMENTS)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
@@ -412,6 +444,7 @@ class RandomRow(FamilyRow):
             remarks=notes,
             binding_requirement=binding,
             displacement_m=_displacement(error, gating),
+            bias=None if error.biased is None else case.number(error.biased.bias),
             navigation=error.navigation and NavigationState(*error.navigation.at_middle),
         )
 

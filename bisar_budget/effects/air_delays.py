@@ -25,7 +25,7 @@ from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.constants import EARTH_RADIUS_M
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import BiasEffects, RandomEffect, RandomError, SensorCases, factor
 from bisar_budget.effects.range_processes import departure_at_nodes
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.error_kinds.random_kinds import PROPAGATION_KIND
@@ -136,14 +136,18 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Pe
     """Quadratic phase at the edges of the band due to the declared electron content of each leg. [rad]
 
     The result maps the name of a platform to the phase of its leg. The phases include the coverage factor. A leg
-    without a declared content is left out.
+    without a declared content is left out. The magnitude of a bias is added.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
     phases: dict[str, PerCase] = {}
     for name, path in zip(PLATFORMS, geometry.both, strict=True):
         content = None if propagation is None else propagation.content(name)
-        if content is not None:
-            phases[name] = content * factor * dispersion_per_unit(mission, path)
+        leg = None if propagation is None else propagation.leg(name)
+        if content is not None and leg is not None:
+            bias = leg.bias.get(CONTENT)
+            phases[name] = (content * factor + (0.0 if bias is None else np.abs(bias))) * dispersion_per_unit(
+                mission, path
+            )
     return phases
 
 
@@ -218,6 +222,8 @@ def _delay_error(
         published, full = seen.of_courses(course[None], at_mid_aperture[None])
     else:
         published, full = _changing(seen, delay, moving, at_mid_aperture[0], correlation_time)
+    bias = None if leg is None else leg.bias.get(delay)
+    biased = None if bias is None else _biased(seen, bias, delay, moving, at_mid_aperture)
     return RandomError(
         subject=subject(owner, PROPAGATION_KIND.name, delay),
         unit=PROPAGATION_KIND.size(delay).unit,
@@ -227,7 +233,23 @@ def _delay_error(
         full=full,
         spreads=correlation_time is not None,
         counted_in=counted_in,
+        biased=biased,
     )
+
+
+def _biased(seen: SensorCases, bias: PerCase, delay: str, moving: Floats, at_mid_aperture: Floats) -> BiasEffects:
+    """Effects of the bias of a delay, which is constant over the aperture.
+
+    `moving` and `at_mid_aperture` (nodes, cases) [m/unit] are the group delays of a unit, see `_groups_of_leg`.
+    """
+    exact = seen.exact
+    course = seen_course(moving, exact.fit[0] @ moving, delay)
+    full = (seen.weights * course).sum(axis=1)
+    constant, linear, quadratic, cubic = exact.fit @ at_mid_aperture
+    (a, b), (c, d) = seen.plane.adjugate
+    scale = 1 / np.where(seen.plane.is_singular, math.nan, seen.plane.determinant)
+    places = [(u * constant + v * linear / exact.half) * scale for u, v in ((a, b), (c, d))]
+    return BiasEffects(bias, np.array([exact.k * quadratic, exact.k * cubic, *places]), full)
 
 
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:

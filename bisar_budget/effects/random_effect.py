@@ -20,7 +20,7 @@ from bisar_budget.arrays import Floats, Indices, PerCase, PerCaseFlag
 from bisar_budget.constants import VECTOR_ROUNDING_FRACTION
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC, ImagePlane, published_planes
 from bisar_budget.effects.effect import Subject, plain
-from bisar_budget.effects.error_quantiles import normal_length_ratio, quantile_factor
+from bisar_budget.effects.error_quantiles import allowable_size, judged_size, normal_length_ratio, quantile_factor
 from bisar_budget.effects.range_processes import (
     RangeEffects,
     effect_weights,
@@ -149,6 +149,31 @@ class Moves(NamedTuple):
     courses: Floats
 
 
+class BiasEffects(NamedTuple):
+    """Bias of an error, and the signed effects of one unit of it in both models.
+
+    The effects of the full model have the order of `range_processes.effect_weights`, (8, ...), and those of the
+    published model are its first four. They are phases [rad/unit] and displacements [m/unit].
+    """
+
+    bias: PerCase
+    published: Floats
+    full: Floats
+
+    def of(self, case: int) -> "BiasEffects":
+        """Return the bias and its effects in the case with the given index."""
+        published, full = (
+            effects[..., case if effects.shape[-1] > 1 else 0] for effects in (self.published, self.full)
+        )
+        return BiasEffects(plain(self.bias, case), published[:, None], full[:, None])
+
+    def sizes(self, model: str, gain: PerCase) -> tuple[Floats, Floats, Floats]:
+        """Magnitudes of judged phase, cubic phase and displacement due to the bias; see `Declared.judged`."""
+        effects = self.bias * (self.full if model == "full" else self.published)
+        judged = np.sqrt(effects[0] ** 2 + gain**2 * np.square(effects[4:]).sum(axis=0))
+        return judged, np.abs(effects[1]), np.hypot(effects[2], effects[3])
+
+
 class RandomError(NamedTuple):
     """Random error of a sensor, a clock or the air: its subject, its declared size and the effect of one unit.
 
@@ -160,6 +185,8 @@ class RandomError(NamedTuple):
     from the mission of one case and the name of the platform. `navigation` is the covariance of an aided navigation,
     and None for errors of any other kind. `spreads` is true for noise, and false for an error whose variation over
     the aperture has only a few orders.
+
+    `biased` is the bias of the error with its effects, and None if the file states no bias.
 
     `counted_in` is the id of another row that already includes the effect of this error. This error is then left out
     of sums. `moves` is the motion of platforms due to one unit, used for the edge of a scene. It is empty for clocks
@@ -182,6 +209,7 @@ class RandomError(NamedTuple):
     is_in_doubt: PerCaseFlag = False
     noise_in_case: "Callable[[Mission, str], Noise] | None" = None
     navigation: "NavigationErrors | None" = None
+    biased: BiasEffects | None = None
 
     @property
     def id(self) -> str:
@@ -232,6 +260,75 @@ class RandomError(NamedTuple):
     def effect(self, model: str) -> RandomEffect:
         """Effect of one unit of the error in the model with the given name, `full` or `published`."""
         return self.full if model == "full" else self.published
+
+    def judged(self, model: str, confidence_of: Callable[[str], float | None], gain: PerCase) -> RandomEffect:
+        """Effect of the declared error as the requirements judge it, with its bias; see `judged_effect`.
+
+        The displacement of a biased error has no direction, and is given to the east. The rms phases beyond the cubic
+        and the covariance are those of one unit.
+        """
+        effect = self.judged_effect(model, confidence_of, gain)
+        if self.biased is None:
+            return effect._replace(
+                quadratic=effect.quadratic * self.declared,
+                hidden=effect.hidden * self.declared,
+                cubic=effect.cubic * self.declared,
+                east=effect.east * self.declared,
+                north=effect.north * self.declared,
+            )
+        phase, edge, place = (
+            judged_size(self.distribution, part * self.declared, bias, confidence_of(key))
+            for key, part, bias in zip(
+                (QUADRATIC, CUBIC, LOCATION), self._parts(model, gain), self.biased.sizes(model, gain), strict=True
+            )
+        )
+        return effect._replace(quadratic=phase, hidden=0.0, cubic=edge, east=place, north=0.0 * place)
+
+    def _parts(self, model: str, gain: PerCase) -> tuple[PerCase, PerCase, PerCase]:
+        """Sigmas of judged phase, cubic phase and length of the displacement due to one unit of the error."""
+        effect = self.effect(model)
+        return effect.judged(gain), effect.cubic, effect.displacement
+
+    def uses(
+        self,
+        model: str,
+        limits: Sequence[PerCase | None],
+        confidence_of: Callable[[str], float | None],
+        gain: PerCase,
+    ) -> tuple[Floats, list[PerCase]]:
+        """Utilization of limits by an error with a bias, and the sizes of its random part that use them up.
+
+        `limits` are the limits of quadratic phase with the gain of autofocus, cubic phase, and displacement; None
+        means no limit. The random part of the displacement is taken along the bias, which is exact for a constant
+        delay and large for a changing one. Returns the largest utilization, and a size for each limit.
+        """
+        assert self.biased is not None
+        judged = self.judged(model, confidence_of, gain)
+        uses: Floats = np.zeros(np.shape(judged.quadratic))
+        sizes: list[PerCase] = []
+        values = (judged.quadratic, judged.cubic, judged.displacement)
+        parts = zip(
+            limits,
+            values,
+            self._parts(model, gain),
+            self.biased.sizes(model, gain),
+            (QUADRATIC, CUBIC, LOCATION),
+            strict=True,
+        )
+        for limit, value, part, bias, key in parts:
+            if limit is None:
+                sizes.append(math.inf)
+                continue
+            uses = np.maximum(uses, value / limit)
+            most = allowable_size(self.distribution, limit, bias, confidence_of(key))
+            with np.errstate(all="ignore"):
+                sizes.append(np.where(np.asarray(part) > 0, most / part, np.where(bias > limit, 0.0, math.inf)))
+        return uses, sizes
+
+    @property
+    def distribution(self) -> str:
+        """Distribution of the random part: normal, or a bound for an effect that the file states."""
+        return "normal" if self.is_covered else "bound"
 
     def judged_effect(self, model: str, confidence_of: Callable[[str], float | None], gain: PerCase) -> RandomEffect:
         """Effect of one unit of the error as the requirements judge it: each phase and displacement at its quantile.

@@ -23,7 +23,7 @@ from bisar_budget.effects.navigation_errors import (
 )
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
 from bisar_budget.effects.oscillators import link_noise, oscillator_noise
-from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
+from bisar_budget.effects.random_effect import BiasEffects, RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.vibration import vibration_spectrum
 from bisar_budget.error_kinds.random_kinds import OTHER_KIND
 from bisar_budget.geometry import BistaticGeometry
@@ -69,7 +69,12 @@ def _stated_effects(mission: Mission) -> Iterator[RandomError]:
             if size is not None:
                 row_subject = subject("mission", OTHER_KIND.name, f"{stated.name}.{key}", entry=index)
                 unit, path = OTHER_KIND.size(key).unit, OTHER_KIND.path("mission", key, index)
-                yield RandomError(row_subject, unit, np.abs(size), path, effect, effect, spreads=False)
+                error = RandomError(row_subject, unit, np.abs(size), path, effect, effect, spreads=False)
+                bias = stated.bias.get(key)
+                if bias is not None:
+                    unit_phase = np.array([0.0, 1.0] + [0.0] * 6)[:, None]
+                    error = error._replace(biased=BiasEffects(bias, unit_phase[:4], unit_phase))
+                yield error
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
@@ -88,5 +93,6 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
         noise=noise,
         continued=continued,
         is_in_doubt=bool(plain(error.is_in_doubt, case)),
+        biased=error.biased and error.biased.of(case),
         navigation=error.navigation and error.navigation.of(case),
     )

@@ -38,6 +38,7 @@ from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, FullEffect
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
+QUADRATIC_PHASE = "quadratic_phase_error"  # key of a stated phase
 _BETWEEN_NODES = np.linspace(-1.0, 1.0, 65)  # slow times over half the aperture at which a stated motion is checked
 _UNRESOLVED_FRACTION = 1e-3  # of a motion; the effects of the rest are as small a part of those of the motion
 AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
@@ -290,7 +291,7 @@ class ErrorListing:
         is_set = sync is not None and sync.is_holdover
         for power, term in enumerate(TIMING_KIND.sizes):
             timing, row_subject = self.mission.timing_error, subject("clock", TIMING_KIND.name, term)
-            value = timing.stated(term)
+            value = getattr(timing, term)
             if self._is_listed(row_subject, value) and not (is_set and power < 2):  # `_of_setting` lists these
                 no_limit = (
                     phrases.note("no-quadratic-term-of-clock", term=term)
@@ -478,13 +479,13 @@ class ErrorListing:
         """
         for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
-            if error.tag is not None:
-                tag = self._of_time_tag(name, (platform_index,), error.tag, error.source)
+            if error.time_tag is not None:
+                tag = self._of_time_tag(name, (platform_index,), error.time_tag, error.source)
                 yield tag._replace(bias=_bias(error.bias, TIME_TAG_KIND.name))
         common = self.mission.common_motion_error
-        if common is not None and common.tag is not None:
+        if common is not None and common.time_tag is not None:
             note = phrases.note("held-to-the-total", owners="both platforms")
-            tag = self._of_time_tag("mission", (0, 1), common.tag, common.source, note)
+            tag = self._of_time_tag("mission", (0, 1), common.time_tag, common.source, note)
             yield tag._replace(bias=_bias(common.bias, TIME_TAG_KIND.name))
 
     def _of_time_tag(
@@ -615,6 +616,7 @@ class ErrorListing:
                 no_limit=NOTHING,
                 evidence=stated.source,
                 notes=(phrases.note("held-to-the-total", owners="no platform"),),
+                bias=_bias(stated.bias, QUADRATIC_PHASE),
             )
 
 

@@ -32,7 +32,6 @@ from bisar_budget.mission.readers import (
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
-    SIZE,
     Choice,
     Day,
     Glob,
@@ -50,6 +49,7 @@ from bisar_budget.mission.readers import (
     Statement,
     Text,
     TextMap,
+    Undirected,
     Version,
     Weights,
     Whole,
@@ -204,11 +204,6 @@ class TimingError(NamedTuple):
     cubic: Annotated[float | None, Key(WithBias(Quantity(units.RATE_SQUARED, ge=-1e6, le=1e6), "ClockCubic"))] = None
     bias: Mapping[str, float | None] = {}
 
-    def stated(self, term: str) -> float | None:
-        """Size of a term; 0 if the file states only its bias, and None if the file states neither."""
-        size: float | None = getattr(self, term)
-        return 0.0 if size is None and self.bias.get(term) is not None else size
-
 
 class OtherError(NamedTuple):
     """An error from elsewhere, stated by its effects on the image; at least one effect.
@@ -217,11 +212,18 @@ class OtherError(NamedTuple):
     """
 
     name: Annotated[str, Key(Text(), "Becomes the row ids other.NAME, other.NAME.cubic_phase_error and so on.")]
-    quadratic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
-    cubic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
-    location_error: Annotated[float | None, Key(SIZE, "Displacement of the image, in any direction.")] = None
+    quadratic_phase_error: Annotated[
+        float | None, Key(WithBias(PHASE, "QuadraticPhaseError"), "At the aperture edge.")
+    ] = None
+    cubic_phase_error: Annotated[float | None, Key(WithBias(PHASE, "CubicPhaseError"), "At the aperture edge.")] = (
+        None
+    )
+    location_error: Annotated[
+        float | None, Key(Undirected(units.LENGTH, ge=0, le=1e9), "Displacement of the image, in any direction.")
+    ] = None
     islr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Power that it spreads over the image. [dB]")] = None
     source: Annotated[str | None, Key(Text())] = None
+    bias: Mapping[str, float | None] = {}
 
     @staticmethod
     def any_of() -> tuple[str, ...]:

@@ -123,10 +123,6 @@ def _size_of(error: "MotionError | CommonMotionError", kind: str) -> Vector | No
     return (0.0, 0.0, 0.0) if size is None and error.bias.get(kind) is not None else size
 
 
-def _tag_of(error: "MotionError | CommonMotionError") -> float | None:
-    return 0.0 if error.time_tag is None and error.bias.get(TIME_TAG_KIND.name) is not None else error.time_tag
-
-
 class MotionError(NamedTuple):
     """Error of the measured motion of one platform. A scalar means each axis.
 
@@ -231,11 +227,6 @@ class MotionError(NamedTuple):
         bias: Vector | None = self.bias.get(kind)
         return bias
 
-    @property
-    def tag(self) -> float | None:
-        """Size of the time tag error; 0 if only its bias is stated. [s]"""
-        return _tag_of(self)
-
     def distribution_of(self, kind: str) -> str:
         """Distribution of the error of the given `kind`: `normal`, `uniform` or `bound`."""
         return distribution_for(self.distribution, kind)
@@ -312,11 +303,6 @@ class CommonMotionError(NamedTuple):
         """Bias of the error of the given `kind` along the axes of the frame; None if none is stated."""
         bias: Vector | None = self.bias.get(kind)
         return bias
-
-    @property
-    def tag(self) -> float | None:
-        """Size of the time tag error; 0 if only its bias is stated. [s]"""
-        return _tag_of(self)
 
     def distribution_of(self, kind: str) -> str:
         """Distribution of the error of the given `kind`: `normal`, `uniform` or `bound`."""

@@ -16,7 +16,7 @@ from bisar_budget.error_kinds.random_kinds import PROPAGATION_KIND
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import PlatformState, Vectors
 from bisar_budget.mission.platforms import Platforms
-from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, Source
+from bisar_budget.mission.readers import Key, Quantity, Section, SectionValues, Source, WithBias
 
 DELAYS = tuple(PROPAGATION_KIND.sizes)
 _CORRELATION_TIME_KEY = "correlation_time"
@@ -26,21 +26,26 @@ AIR_TOP_M = 80e3  # few free electrons are below this height, and little air is 
 _ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
 _CONTENT_QUANTITY = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
 _CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # the same bounds as for other Gauss-Markov errors
+_DELAY_ERROR = WithBias(_ZENITH_DELAY, "ZenithDelayError", Quantity(units.LENGTH, ge=-1e3, le=1e3))
+_CONTENT_ERROR = WithBias(
+    _CONTENT_QUANTITY, "ElectronContentError", Quantity(units.ELECTRON_CONTENT, ge=-1e20, le=1e20)
+)
 _COARSE_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in units of half the aperture time
 
 
 class LegDelay(NamedTuple):
     """Residual delays on one leg after correction, 1 sigma."""
 
-    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Delay of the troposphere.")] = None
+    zenith_delay: Annotated[float | None, Key(_DELAY_ERROR, "Delay of the troposphere.")] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_CONTENT_QUANTITY, "Electron content of the ionosphere; 1 TECU is 1e16/m².")
+        float | None, Key(_CONTENT_ERROR, "Electron content of the ionosphere; 1 TECU is 1e16/m².")
     ] = None
     correlation_time: Annotated[
         float | None,
         Key(_CORRELATION_TIME, "Time in which the delays of this leg change; omitted: they are constant."),
     ] = None
     source: Source = None
+    bias: Mapping[str, float | None] = {}
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -69,11 +74,11 @@ class Propagation(NamedTuple):
     """
 
     zenith_delay: Annotated[
-        float | None, Key(_ZENITH_DELAY, "Delay of the troposphere, of one air over both legs.")
+        float | None, Key(_DELAY_ERROR, "Delay of the troposphere, of one air over both legs.")
     ] = None
     zenith_electron_content: Annotated[
         float | None,
-        Key(_CONTENT_QUANTITY, "Electron content of the ionosphere, of one air over both legs; 1 TECU is 1e16/m²."),
+        Key(_CONTENT_ERROR, "Electron content of the ionosphere, of one air over both legs; 1 TECU is 1e16/m²."),
     ] = None
     correlation_time: Annotated[
         float | None,
@@ -86,6 +91,7 @@ class Propagation(NamedTuple):
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
     receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None
     source: Source = None
+    bias: Mapping[str, float | None] = {}
 
     @staticmethod
     def problems(values: SectionValues) -> Iterator[Problem]:
@@ -140,7 +146,9 @@ class Propagation(NamedTuple):
         None if the file states delays only for the leg of the other platform.
         """
         if self.is_one_air:
-            return LegDelay(self.zenith_delay, self.zenith_electron_content, self.correlation_time, self.source)
+            return LegDelay(
+                self.zenith_delay, self.zenith_electron_content, self.correlation_time, self.source, self.bias
+            )
         platform_leg: LegDelay | None = getattr(self, platform)
         if platform_leg is None:
             return None

@@ -31,9 +31,10 @@ from bisar_budget.mission.changes import (
 from bisar_budget.mission.covariance import MOTION_KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import POWERS, Imu, LeverArm
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.model import MISSION, Mission, Requirements, Simulation, TimingError
+from bisar_budget.mission.model import MISSION, Mission, OtherError, Requirements, Simulation, TimingError
 from bisar_budget.mission.navigation import OUTAGE_KEYS
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
+from bisar_budget.mission.propagation import LegDelay, Propagation
 from bisar_budget.mission.readers import (
     BIAS_FIELD,
     CONFIDENCE_FIELD,
@@ -384,7 +385,7 @@ _CURVE_ABSCISSAS: Mapping[str, Dimension] = {
 }
 
 
-_WITH_BIASES = (MotionError, CommonMotionError, TimingError)
+_WITH_BIASES = (MotionError, CommonMotionError, TimingError, LegDelay, Propagation, OtherError)
 _PLAIN_FIELDS = (SIZE_FIELD, "limit")  # of pairs of a number and its bias or confidence
 
 

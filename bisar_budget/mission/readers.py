@@ -913,15 +913,19 @@ class _SizeAndBias(_Pair):
     The class reads the size as the value of the key, and the bias as content beside it.
     """
 
+    def __init__(self, name: str, meaning: str, keys: dict[str, Key], unstated: float | None) -> None:
+        super().__init__(name, meaning, keys)
+        self.unstated = unstated
+
     def read(self, value: object, path: KeyPath, report: Report) -> Any:
-        """Read both; a size that the file does not state is None."""
+        """Read both; a size that the file does not state has the value `unstated`."""
         pair = super().read(value, path, report)
         if pair is INVALID:
             return INVALID
         if not pair:
             report(path, Problem("states neither sigma nor bias", "accepted: {sigma: …, bias: …}"))
             return INVALID
-        return Beside(pair.get(SIZE_FIELD), BIAS_FIELD, pair.get(BIAS_FIELD))
+        return Beside(pair.get(SIZE_FIELD, self.unstated), BIAS_FIELD, pair.get(BIAS_FIELD))
 
 
 class WithBias(OneOf[Any]):
@@ -930,17 +934,21 @@ class WithBias(OneOf[Any]):
     Parameters
     ----------
     plain : Quantity or Triple
-        Reader of a size without a bias, and of a bias.
+        Reader of a size without a bias.
     name : str
         Name of the form with a bias in the JSON Schema.
+    bias : Quantity, optional
+        Reader of a bias; by default `plain`.
     """
 
-    def __init__(self, plain: "Quantity | Triple", name: str) -> None:
+    def __init__(self, plain: "Quantity | Triple", name: str, bias: "Quantity | None" = None) -> None:
         keys = {
             SIZE_FIELD: Key(_without_sign(plain), "Size of the random part, as without a bias."),
-            BIAS_FIELD: Key(plain, "The known, constant part, with its sign."),
+            BIAS_FIELD: Key(bias or plain, "The known, constant part, with its sign."),
         }
-        self.pair = _SizeAndBias(name, "Size of an error and its bias.", keys)
+        # A position or velocity without a sigma may stand beside a covariance.
+        unstated = None if isinstance(plain, Triple) else 0.0
+        self.pair = _SizeAndBias(name, "Size of an error and its bias.", keys, unstated)
         super().__init__(lambda value: self.pair if isinstance(value, dict) else plain, (plain, self.pair))
 
 
@@ -1028,6 +1036,20 @@ class Level(Quantity):
             return super().read(value, path, report)
         problem = "is an expectation over all errors, and has no confidence"
         report(path, Problem(problem, "accepted: a level alone, such as -20 dB"))
+        return INVALID
+
+
+class Undirected(Quantity):
+    """Size of a displacement in any direction, which can have no bias.
+
+    The class reads it like any quantity, and explains the refusal of a bias.
+    """
+
+    def read(self, value: object, path: KeyPath, report: Report) -> float | Invalid:
+        """Read the size; a mapping is refused."""
+        if not isinstance(value, dict):
+            return super().read(value, path, report)
+        report(path, Problem("has no direction, and so no bias", "accepted: a length alone, such as 10 cm"))
         return INVALID
 
 

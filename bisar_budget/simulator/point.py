@@ -433,7 +433,10 @@ def _with_stated_effects(mission: Mission, errors: Errors) -> Errors:
     measured path of the receiver. The coverage factor is not applied to these effects.
     """
     quadratic, cubic, shift = (
-        math.fsum(getattr(stated, effect) or 0.0 for stated in mission.other_errors) for effect in OTHER_EFFECTS[:3]
+        math.fsum(
+            (getattr(stated, effect) or 0.0) + (stated.bias.get(effect) or 0.0) for stated in mission.other_errors
+        )
+        for effect in OTHER_EFFECTS[:3]
     )
     if quadratic or cubic:
         T, times = mission.collection.aperture_time, np.linspace(-1.0, 1.0, _STATED_PHASE_SAMPLES)

@@ -256,11 +256,16 @@ def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith:
     `at_zenith` (draws, times) are the zenith delays in units of the declared standard deviation.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
+    return np.asarray(size * _delay_of_unit(mission, error, times) * at_zenith)
+
+
+def _delay_of_unit(mission: Mission, error: RandomError, times: Floats) -> Floats:
+    """Group delay along the signal path due to one unit of a zenith delay or electron content, (times,). [m/unit]"""
     of_unit = np.zeros(times.shape)
     for name in legs_of(error.owner):
         path: PlatformState = getattr(mission.geometry, name)
         of_unit = of_unit + group_delay(mission, path, error.subject.axis, times)
-    return np.asarray(size * of_unit * at_zenith)
+    return of_unit
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
@@ -332,6 +337,8 @@ class _DrawnErrors:
     def add_delay(self, error: RandomError, rng: np.random.Generator) -> None:
         """Draw the delay of the echoes in the atmosphere, and add it to the sum of delays of the same kind."""
         (group,) = self.factor * delay_courses(self.mission, error, self.times, 1, rng)
+        if error.biased is not None:
+            group = group + float(np.ravel(error.biased.bias)[0]) * _delay_of_unit(self.mission, error, self.times)
         self._air[error.subject.axis] = self._air[error.subject.axis] + group
 
     def add_vibration(self, error: RandomError, rng: np.random.Generator) -> None:

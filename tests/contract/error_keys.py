@@ -353,15 +353,6 @@ ERROR_KEYS: dict[str, ErrorKey] = {
     "other_errors.islr": ErrorKey("-30 dB", "-20 dB", "other.antenna.islr", ANTENNA, "other_errors"),
     REGISTERED: ErrorKey("5 cm/s", "10 cm/s", f"receiver.{REGISTERED_KIND.name}"),
 }
-# Figures whose size and bias stand in a section of their own, and a size beside which the bias has an effect.
-for _key, _small in (
-    *((f"{_section}{_figure}", _size) for _section in (ERROR, COMMON) for _figure, _size in _SMALL_SIZES.items()),
-    *((f"timing_error.{_term}", _size) for _term, _size in _SMALL_TERMS.items()),
-):
-    _alone = ERROR_KEYS[_key]
-    ERROR_KEYS[f"{_key}.sigma"] = _alone._replace(absent=_key)
-    ERROR_KEYS[f"{_key}.bias"] = _alone._replace(beside={f"{_key}.sigma": _small})
-
 # Keys that describe an error: which of them changes nothing that is computed is said beside it.
 _VELOCITY = {f"{ERROR}velocity": ["5 cm/s", 0, 0]}
 _SHARED = {f"{COMMON}velocity": ["5 cm/s", 0, 0]}
@@ -407,6 +398,21 @@ DESCRIBING_KEYS: dict[str, tuple[Document, Any, Any]] = {
 def path_of(key: str) -> str:
     """Path of a key in a mission file, in the first entry of each list."""
     return re.sub(r"\b(random|sinusoidal|other_errors|outages)\.(?=[a-z])", r"\1.0.", key)
+
+
+# Figures whose size and bias stand in a section of their own, and a size beside which the bias has an effect.
+for _key, _small in (
+    *((f"{_section}{_figure}", _size) for _section in (ERROR, COMMON) for _figure, _size in _SMALL_SIZES.items()),
+    *((f"timing_error.{_term}", _size) for _term, _size in _SMALL_TERMS.items()),
+    *((f"propagation.{_leg}zenith_delay", "1 mm") for _leg in OTHER_LEG),
+    *((f"propagation.{_leg}zenith_electron_content", "0.01 TECU") for _leg in OTHER_LEG),
+    *((f"other_errors.{_phase}", "0.1 deg") for _phase in ("quadratic_phase_error", "cubic_phase_error")),
+):
+    _alone = ERROR_KEYS[_key]
+    ERROR_KEYS[f"{_key}.sigma"] = _alone._replace(absent=_key)
+    ERROR_KEYS[f"{_key}.bias"] = _alone._replace(
+        beside={**_alone.beside, f"{path_of(_key)}.sigma": _small}, absent=f"{_key}.bias"
+    )
 
 
 def number_in(key: str) -> tuple[str, Any, Any]:
