@@ -100,6 +100,10 @@ class RandomVector(NamedTuple):
         normal = (ways * np.sqrt(np.maximum(squares, 0.0))).T
         return cls(nothing.sum(axis=0), normal, nothing, nothing, np.zeros((0, 2, len(covariance))))
 
+    def along(self, way: Floats) -> "RandomVector":
+        """Component of the vector along a unit vector (m,), as a random vector of one component."""
+        return RandomVector(*(part @ way[:, None] for part in self))
+
     def probability(self, limit: float) -> float:
         """Probability that the length of the vector is at most a limit, in the unit of the vector."""
         if limit < 0.0:

@@ -26,6 +26,7 @@ from bisar_budget.random_vector import RandomVector
 
 PERCENTILES = (0.5, 0.68, 0.9, 0.95, 0.997)  # probabilities that every report states
 
+_UNSEEN_SQUARE_FRACTION = 4e-4  # of the square of a phase; a hidden phase below it adds 0.02 % to a quantile
 _UNIFORM_WIDTH = math.sqrt(3)  # largest value of a uniform variable of variance 1
 IsMember = Callable[[str], bool]
 """Whether the errors of an owner, such as `receiver`, are part of a sum."""
@@ -73,8 +74,7 @@ class Totals:
             Gain of autofocus, which multiplies the hidden phase; see `Declared.judged`.
         """
         variables = [each for each in self._of(model, case) if is_member(each.owner)]
-        lengths = [len(each.effects) for each in variables]
-        columns, weights = _columns(requirement, max(lengths, default=FIRST_HIDDEN_INDEX), plain(gain, case))
+        columns, weights = _columns(requirement, _hidden_count(variables, plain(gain, case)), plain(gain, case))
         parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": [], CONSTANT: []}
         for variable in variables:
             vector = (
@@ -113,19 +113,9 @@ class Totals:
                 (reached[case],) = vector.quantiles((confidence,))
         return reached
 
-    def percentiles(self, model: str, requirement: str, case: int, way: Floats | None = None) -> list[float]:
-        """Sizes that the effect of all errors does not exceed with each probability of `PERCENTILES`.
-
-        `way` (2,) is a unit vector on the ground; if it is given, they are of the displacement along it.
-        """
-        vector = self.vector(model, requirement, lambda owner: True, case)
-        if way is not None:
-            vector = RandomVector(*(part @ np.asarray(way)[:, None] for part in vector))
-        return vector.quantiles(PERCENTILES)
-
-    def probability(self, model: str, requirement: str, limit: float, case: int) -> float:
-        """Probability that the effect of all errors, drawn together, keeps a limit, in its unit."""
-        return self.vector(model, requirement, lambda owner: True, case).probability(limit)
+    def of_all(self, model: str, requirement: str, case: int) -> RandomVector:
+        """Random vector of the effect of all declared errors, without the gain of autofocus; see `vector`."""
+        return self.vector(model, requirement, lambda owner: True, case)
 
     # ---------------------------------------------------------------- variables of a model
     def _of(self, model: str, case: int) -> list[Variable]:
@@ -219,13 +209,25 @@ class Totals:
         return float(effect / first_order) if first_order and math.isfinite(effect) else 1.0
 
 
-def _columns(requirement: str, count: int, gain: float) -> tuple[list[int], Floats]:
+def _hidden_count(variables: Sequence[Variable], gain: float) -> int:
+    """Number of parts of the hidden phase that variables have; 0 if they change no quantile."""
+    phase = hidden = 0.0
+    for variable in variables:
+        for effects in (variable.effects, variable.quadrature):
+            phase += sum(effect**2 for effect in effects[effects_of.QUADRATIC : effects_of.QUADRATIC + 1])
+            hidden += sum(effect**2 for effect in effects[FIRST_HIDDEN_INDEX:])
+    if gain**2 * hidden <= _UNSEEN_SQUARE_FRACTION * phase:
+        return 0
+    return max(len(variable.effects) for variable in variables) - FIRST_HIDDEN_INDEX
+
+
+def _columns(requirement: str, hidden_count: int, gain: float) -> tuple[list[int], Floats]:
     """Indices of the effects whose length a requirement limits, and the factors of these effects."""
     if requirement == LOCATION:
         return [effects_of.EAST, effects_of.NORTH], np.ones(2)
     if requirement == CUBIC:
         return [effects_of.CUBIC], np.ones(1)
-    hidden = list(range(FIRST_HIDDEN_INDEX, count))
+    hidden = list(range(FIRST_HIDDEN_INDEX, FIRST_HIDDEN_INDEX + hidden_count))
     return [effects_of.QUADRATIC, *hidden], np.array([1.0, *(gain for _ in hidden)])
 
 

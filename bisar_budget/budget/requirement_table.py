@@ -14,7 +14,6 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.totals import PERCENTILES
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
-from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import PULL_IN
 from bisar_budget.budget.declarations import (
     DECLARATIONS,
@@ -40,6 +39,7 @@ from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.random_vector import RandomVector
 
 
 # ---------------------------------------------------------------------- rows
@@ -232,21 +232,27 @@ def _distribution(key: str, judged: JudgedMission, case: Case) -> dict[str, Any]
     of_all = together.moved("rss") if key == LOCATION else together.judged(together.phases, "rss")
     if not math.isfinite(case.number(of_all)):
         return {}
-    names = [f"{100 * confidence:g}" for confidence in PERCENTILES]
-
-    def percentiles(way: Floats | None = None) -> dict[str, float]:
-        return dict(zip(names, totals.percentiles(model, key, case.place, way), strict=True))
-
-    limit = getattr(case.mission.requirements, key)
-    fields: dict[str, Any] = {"percentiles": percentiles()}
+    vector, limit = totals.of_all(model, key, case.place), getattr(case.mission.requirements, key)
+    fields: dict[str, Any] = {"percentiles": _percentiles(vector)}
     if limit is not None:
-        fields["probability"] = totals.probability(model, key, limit, case.place)
+        fields["probability"] = vector.probability(limit)
     if key == LOCATION:
         east, north = (case.number(component) for component in case.geometry.range_gradient)
         along = np.array((east, north)) / math.hypot(east, north)
         across = np.array((-along[1], along[0]))
-        fields |= {"percentiles_range": percentiles(along), "percentiles_azimuth": percentiles(across)}
+        fields |= {
+            "percentiles_range": _percentiles(vector.along(along)),
+            "percentiles_azimuth": _percentiles(vector.along(across)),
+        }
     return fields
+
+
+_PERCENTILE_NAMES = tuple(f"{100 * confidence:g}" for confidence in PERCENTILES)
+
+
+def _percentiles(vector: RandomVector) -> dict[str, float]:
+    """Lengths that a random vector does not exceed with each of the reported probabilities, by their percent."""
+    return dict(zip(_PERCENTILE_NAMES, vector.quantiles(PERCENTILES), strict=True))
 
 
 def _waivers(
