@@ -574,6 +574,17 @@ class PartFile(NamedTuple):
     data: bytes
 
 
+class UncertainFigure(NamedTuple):
+    """A figure whose standard uncertainty the file states, by its key; three axes with one value are one figure.
+
+    `relative_uncertainty` is the standard uncertainty divided by the size of the figure. For a level it is that of
+    the amplitude: 1 dB is 0.115.
+    """
+
+    key: str
+    relative_uncertainty: float
+
+
 class Mission(NamedTuple):
     """A mission file that can be used.
 
@@ -594,6 +605,8 @@ class Mission(NamedTuple):
     taken : tuple of TakenFigure
         Figures that the mission takes from parts. A file that stated these figures itself would describe the same
         mission.
+    uncertainties : tuple of UncertainFigure
+        Figures that the file states with an uncertainty. Only `check --guard` uses them.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -652,6 +665,7 @@ class Mission(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
     taken: tuple[TakenFigure, ...] = ()
+    uncertainties: tuple[UncertainFigure, ...] = ()
 
     def __repr__(self) -> str:
         """Text on one line with the path of the file and the name of the mission."""
