@@ -79,6 +79,8 @@ def _size_reader(reader: Reader[object] | None, path: KeyPath) -> Quantity | Non
     """
     if isinstance(reader, Triple) and reader.or_scalar:
         reader = reader.component
+    while path and isinstance(path[-1], int):  # a component of a vector
+        path = path[:-1]
     is_size = is_error(".".join(map(str, path))) and "correlation" not in path
     return reader if isinstance(reader, Quantity) and is_size else None
 

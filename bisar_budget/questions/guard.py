@@ -2,11 +2,11 @@
 
 A mission declares the size of an error, such as the sigma of a velocity, and the file may state the standard
 uncertainty of this size. The utilization of a requirement is then uncertain too. Each uncertain size is changed by a
-factor of exp(±u), where u is its relative standard uncertainty, and the mission is checked again. The factor keeps the
-sign of the size. The logarithms of the sizes are normal and independent. The logarithm of the utilization is taken as
-normal. Its mean and variance follow from the differences of the checks, to second order without mixed terms (JCGM
-100:2008, 5.1.2). The probability that the true utilization is on the other side of 1 is the specific risk of JCGM
-106:2012, 9.3: it belongs to this mission, not to a production.
+factor of exp(±u), where u is its relative standard uncertainty, and the mission is checked again. The factor keeps
+the sign of the size. The logarithms of the sizes are normal and independent. The logarithm of the utilization is
+taken as normal. Its mean and variance follow from the differences of the checks, to second order without mixed terms
+(JCGM 100:2008, 5.1.2). The probability that the true utilization is on the other side of 1 is the specific risk of
+JCGM 106:2012, 9.3: it belongs to this mission, not to a production.
 """
 
 import math
