@@ -97,7 +97,7 @@ def check(
 
         findings = findings._replace(monte_carlo=drawn(findings.analysed(), *drawn_here(monte_carlo, seed)))
     if guard:
-        from bisar_budget.questions.guard import with_guard
+        from bisar_budget.questions.guarding import with_guard
 
         findings = cast("MissionFindings", with_guard(findings, today))
     if verify:
@@ -152,7 +152,7 @@ def checked(
         keep = partial(_guarded_alone, today=today)
     results = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
     if is_guarded and keep is whole:
-        from bisar_budget.questions.guard import with_guard
+        from bisar_budget.questions.guarding import with_guard
 
         results = [with_guard(findings, today) for findings in results]
     if is_verified:
@@ -164,7 +164,7 @@ def checked(
 
 def _guarded_alone(findings: CheckedMission, today: dt.date) -> CheckedMission:
     """Add the probabilities that verdicts are wrong to the findings, and remove their analysis."""
-    from bisar_budget.questions.guard import with_guard
+    from bisar_budget.questions.guarding import with_guard
 
     return without_analysis(with_guard(findings, today))
 

@@ -167,8 +167,8 @@ def test_other_questions_take_the_figure_alone() -> None:
     key = "platforms.receiver.motion_error.velocity"
     assert bb.solve(stated, key).value == bb.solve(plain, key).value
     assert (
-        bb.sensitivity(stated).to_dict()["missions"][0]["slopes"]
-        == bb.sensitivity(plain).to_dict()["missions"][0]["slopes"]
+        bb.sensitivity(stated).to_dict()["missions"][0]["numbers"]
+        == bb.sensitivity(plain).to_dict()["missions"][0]["numbers"]
     )
     times = {"collection.aperture_time": ["5 s", "6 s"]}
     assert [*bb.sweep(stated, times)["utilization"]] == [*bb.sweep(plain, times)["utilization"]]

@@ -15,7 +15,6 @@ from bisar_budget.report import document as doc
 from bisar_budget.report.answers.shared_blocks import requirement_table
 from bisar_budget.report.answers.verify_answer import evidence
 from bisar_budget.report.renderers.text import lines
-from bisar_budget.report.words.guard import guard_sentences
 from bisar_budget.report.words.heading import (
     document_words,
     doubtful_model,
@@ -43,6 +42,7 @@ from bisar_budget.report.words.sentences import (
     shown_use,
     use_words,
 )
+from bisar_budget.report.words.wrong_verdicts import guard_sentences
 from bisar_budget.units import format_quantity
 
 _PAGE_LINES = 45  # length of a report whose passing rows can be left out

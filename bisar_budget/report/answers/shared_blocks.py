@@ -11,10 +11,10 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
-from bisar_budget.report.words.guard import guard_sentences, risk_words, uncertain_use, verdict_words
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import own_id, sentence
+from bisar_budget.report.words.wrong_verdicts import guard_sentences, risk_words, uncertain_use, verdict_words
 
 
 def opening(
@@ -82,8 +82,8 @@ def guard_blocks(guard: Guard | None) -> Iterator[doc.Block]:
     """
     if guard is None:
         return
-    known = [requirement for requirement in guard.requirements if requirement.probability is not None]
-    if known:
+    quantified = [requirement for requirement in guard.requirements if requirement.probability is not None]
+    if quantified:
         heads = doc.heads("requirement", *doc.numbers("use", "probability that the verdict is wrong"), "verdict")
         lines: list[doc.Line] = [
             [
@@ -92,12 +92,12 @@ def guard_blocks(guard: Guard | None) -> Iterator[doc.Block]:
                 risk_words(requirement),
                 verdict_words(requirement),
             ]
-            for requirement in known
+            for requirement in quantified
         ]
         caption = "Probability that a verdict is wrong, from the stated uncertainties of figures"
         yield doc.TextTable("Guard", caption, heads, lines)
     unknown = [requirement for requirement in guard.requirements if requirement.probability is None]
-    if unknown or not known:
+    if unknown or not quantified:
         yield doc.Items([[text] for text in guard_sentences(replace(guard, requirements=tuple(unknown)))])
 
 
