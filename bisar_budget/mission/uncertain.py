@@ -91,7 +91,7 @@ def _read(tree: Tree, text: str, reader: Quantity, path: KeyPath) -> tuple[str, 
     The uncertainty is None if the text is faulty; a fault of the uncertainty is reported, and one of the figure is
     found when the figure is read.
     """
-    figure, *uncertainties = [part.strip() for part in _MARK.split(text)]
+    figure, *uncertainties = [number.strip() for number in _MARK.split(text)]
     try:
         size = reader.leaf(figure)
     except InvalidValueError:

@@ -164,7 +164,7 @@ def _deviate_of_limit(middle: float, terms: Sequence[_Term]) -> float:
     The quantity is taken as a shifted log-normal variable with the same three first cumulants. This is exact for one
     term, whether it is all of the quantity or added to a constant.
     """
-    change, variance, third = (sum(cumulants) for cumulants in zip(*(term.cumulants for term in terms), strict=True))
+    change, variance, third = (math.fsum(cumulants) for cumulants in zip(*(term.cumulants for term in terms), strict=True))
     mean, sigma = middle + change, math.sqrt(variance)
     skewness = third / sigma**3
     if abs(skewness) < _MIN_SKEWNESS_RATIO:
@@ -179,7 +179,8 @@ def _deviate_of_limit(middle: float, terms: Sequence[_Term]) -> float:
     distance = sign * (1 - shift) / scale
     if distance <= 0:
         return -sign * math.inf
-    return sign * math.log(distance) / log_sigma
+    deviate: float = sign * math.log(distance) / log_sigma
+    return deviate
 
 
 def _normal_probability(deviate: float) -> float:

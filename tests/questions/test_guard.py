@@ -129,7 +129,7 @@ def test_a_requirement_that_no_uncertain_figure_changes_has_no_number() -> None:
     assert _of(guard).probability is None
     assert _of(guard).use_uncertainty is None
     report = render("text", _check(**{VELOCITY: "5 mm/s"}, **changes)._report, Style())
-    words = "Guard: location error is met; its use does not follow from the uncertain figures."
+    words = "Guard: location error is met; no probability follows from the uncertain figures."
     assert words in " ".join(report.split())
 
 

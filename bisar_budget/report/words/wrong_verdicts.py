@@ -21,7 +21,7 @@ def guard_sentences(guard: Guard) -> Iterator[str]:
     for requirement in guard.requirements:
         name, verdict = REQUIREMENT_NAMES[requirement.key], verdict_words(requirement)
         if requirement.probability is None:
-            yield f"Guard: {name} {verdict}; its use does not follow from the uncertain figures."
+            yield f"Guard: {name} {verdict}; no probability follows from the uncertain figures."
         else:
             wrong = risk_words(requirement)
             yield (
