@@ -33,6 +33,7 @@ from bisar_budget.mission.readers import (
     SHARE,
     SIDELOBE_REQUIREMENT,
     SIZE,
+    UNCERTAINTY_TEXT,
     Choice,
     Day,
     Glob,
@@ -625,7 +626,7 @@ class Mission(NamedTuple):
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "Motion error common to both platforms.")
     ] = None
-    timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
+    timing_error: Annotated[TimingError, Key(Section(TimingError), UNCERTAINTY_TEXT)] = TimingError()
     synchronization: Annotated[
         Synchronization | None,
         Key(SYNCHRONIZATION, "How the receiver follows the transmitter's oscillator."),
@@ -633,7 +634,7 @@ class Mission(NamedTuple):
     propagation: Annotated[
         Propagation | None, Key(PROPAGATION, "Delays in the air, on the way to the scene and back.")
     ] = None
-    other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
+    other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError), UNCERTAINTY_TEXT)] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[
         Mapping[str, tuple[str, ...]],

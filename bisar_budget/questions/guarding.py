@@ -164,7 +164,9 @@ def _deviate_of_limit(middle: float, terms: Sequence[_Term]) -> float:
     The quantity is taken as a shifted log-normal variable with the same three first cumulants. This is exact for one
     term, whether it is all of the quantity or added to a constant.
     """
-    change, variance, third = (math.fsum(cumulants) for cumulants in zip(*(term.cumulants for term in terms), strict=True))
+    change, variance, third = (
+        math.fsum(cumulants) for cumulants in zip(*(term.cumulants for term in terms), strict=True)
+    )
     mean, sigma = middle + change, math.sqrt(variance)
     skewness = third / sigma**3
     if abs(skewness) < _MIN_SKEWNESS_RATIO:

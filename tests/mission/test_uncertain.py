@@ -8,7 +8,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.quantities import number_of, tree_of, value_at
 from tests.conftest import ROOT, mission_text
-from tests.mission.test_schema_is_check import hold
+from tests.mission.test_schema_is_check import LOADERS, hold, is_accepted
 
 RECEIVER = "platforms.receiver.motion_error"
 
@@ -188,3 +188,10 @@ def test_a_file_of_requirements_has_none(tmp_path) -> None:
 def test_examples_state_none() -> None:
     for path in sorted((ROOT / "specs" / "missions").glob("*.yaml")):
         assert "±" not in path.read_text(encoding="utf-8").partition("platforms:")[2].replace("# ±", "")
+
+
+def test_the_schema_sees_an_uncertainty_behind_a_wrong_unit() -> None:
+    for mark in ("±", "+/-"):
+        content = mission_text(platforms__receiver__motion_error__velocity=f"5 mrad {mark} 20 %")
+        assert not is_accepted(content, LOADERS["YAML 1.2"])
+        assert is_accepted(content.replace("5 mrad", "5 mm/s"), LOADERS["YAML 1.2"])
