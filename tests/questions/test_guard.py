@@ -151,6 +151,16 @@ def test_levels_and_their_requirement() -> None:
     assert 0 < (found.use_uncertainty or 0.0) / found.use < math.log(10) / 20 * 1.05
 
 
+def test_a_requirement_with_a_confidence() -> None:
+    """The quantile of a single error grows with its size, like its sigma."""
+    location = {"limit": "5 m", "confidence": "95 %"}
+    found = _of(
+        _guard(**{VELOCITY: ["50 mm/s ± 20 %", 0, 0]}, requirements={"location_error": location}, allocation=FULL)
+    )
+    assert (found.use_uncertainty or 0.0) / found.use == pytest.approx(0.2, rel=0.01)
+    assert found.probability == pytest.approx(_below(-abs(math.log(found.use)) / 0.2), rel=0.02)
+
+
 def test_nothing_changes_without_guard() -> None:
     """The uncertainty is in no number, no sentence and no byte, but for the digest of the file."""
     changes: dict[str, Any] = {"requirements": {"location_error": "5 m", "quadratic_phase_error": "45 deg"}}
