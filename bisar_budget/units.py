@@ -16,6 +16,8 @@ _plain_quantity = re.compile(
     r"([+-]?(?:0|[1-9]\d{0,20})(?:\.\d{0,20})?(?:[eE][+-]?\d{1,3})?) ?([^\s\d]\S{0,20})?", re.ASCII
 ).fullmatch
 _MAX_QUANTITY_CHARACTERS = 64  # longer text is not a quantity
+UNCERTAINTY_MARKS = ("±", "+/-")  # between a figure and its standard uncertainty; see `mission.uncertain`
+DB_PER_NEPER = 20 / math.log(10)  # level of an amplitude ratio of e
 
 
 class Dimension:
@@ -450,6 +452,9 @@ def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValue
 def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValueError:
     """Error for a unit that is unknown or of another dimension; its message suggests the intended unit."""
     unit = normal_unit(written)
+    if any(mark in written for mark in UNCERTAINTY_MARKS):
+        hint = "Only the sizes of errors in a mission file have one"
+        return InvalidValueError("has an uncertainty", "accepted: the figure alone", hint)
     if unit.startswith(","):
         return _invalid("has a decimal comma", dimension, "Write a point")
     matches = [match for match in DIMENSIONS if unit in match.units]

@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, by_nodes
@@ -80,24 +81,53 @@ def check_missions(
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
         return
+    for block_mission, block in _alike(missions):
+        if block.size == 1:
+            yield int(block[0]), check_mission(missions[block[0]], today, outside=outside)
+            continue
+        for analysis, same_nodes in _analysed(block_mission, block.size):
+            judged, losses_db = judged_mission(analysis, today), _peak_loss_db(analysis)
+            for case_index, index in enumerate(block[same_nodes].tolist()):
+                alone = Analysis(missions[index], is_complete=True) if keeps_analysis else None
+                case = Case(analysis, missions[index], case_index)
+                yield index, _findings(judged, case, losses_db, today, outside, alone)
+
+
+def requirement_uses(missions: Sequence[Mission], today: date) -> list[dict[str, float]]:
+    """Compute the utilizations of the requirements of each mission, by the keys of the requirements.
+
+    Requirements that are not judged, or whose utilization is not finite, are left out. Missions whose files have the
+    same structure are computed together as arrays, without any text.
+    """
+    uses: list[dict[str, float]] = [{} for _ in missions]
+    for block_mission, block in _alike(missions):
+        for analysis, same_nodes in _analysed(block_mission, block.size):
+            judged = judged_mission(analysis, today)
+            for case_index, index in enumerate(block[same_nodes].tolist()):
+                case = Case(analysis, missions[index], case_index)
+                for state in judged.requirements:
+                    use = case.number(state.utilization)
+                    is_judged = state.user[case_index] >= 0 and not state.is_unjudged[case_index]
+                    if is_judged and math.isfinite(use):
+                        uses[index][state.key] = use
+    return uses
+
+
+def _alike(missions: Sequence[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
+    """Yield blocks of missions whose files have the same structure: the combined mission, and their indices."""
     for alike, indices in stacked(missions):
         for start in range(0, indices.size, _CASES_AT_ONCE):
             block = indices[start : start + _CASES_AT_ONCE]
-            if block.size == 1:
-                yield int(block[0]), check_mission(missions[block[0]], today, outside=outside)
-                continue
-            block_mission = picked(alike, np.arange(start, start + block.size))
-            for nodes, same_nodes, mission_of_nodes, geometry in by_nodes(
-                block_mission, block.size, block_mission.geometry
-            ):
-                analysis = Analysis(
-                    mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_complete=True
-                )
-                judged, losses_db = judged_mission(analysis, today), _peak_loss_db(analysis)
-                for case_index, index in enumerate(block[same_nodes].tolist()):
-                    alone = Analysis(missions[index], is_complete=True) if keeps_analysis else None
-                    case = Case(analysis, missions[index], case_index)
-                    yield index, _findings(judged, case, losses_db, today, outside, alone)
+            yield picked(alike, np.arange(start, start + block.size)), block
+
+
+def _analysed(block_mission: Mission, count: int) -> Iterator[tuple[Analysis, NDArray[np.intp]]]:
+    """Yield the analyses of the `count` cases of a combined mission, each with the indices of its cases."""
+    for nodes, same_nodes, mission_of_nodes, geometry in by_nodes(block_mission, count, block_mission.geometry):
+        yield (
+            Analysis(mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_complete=True),
+            same_nodes,
+        )
 
 
 def _peak_loss_db(analysis: Analysis) -> Floats:

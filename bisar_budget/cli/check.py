@@ -247,6 +247,13 @@ class _Draws(ParamType[int]):
     metavar="S",
     help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
 )
+@click.option(
+    "--guard",
+    "guarding",
+    is_flag=True,
+    help="Also give the probability that each verdict is wrong, from figures of errors with a standard uncertainty, "
+    "such as 5 mm ± 20 %. The exit code stays the same.",
+)
 @scheduler_options("Draw", " The result is the same.")
 @click.option(
     "--sweep",
@@ -299,6 +306,7 @@ def check(
     verifying: bool,
     draws: int | None,
     seed: int | None,
+    guarding: bool,
     scheduler: str | None,
     patience: int,
     swept: Sequence[str],
@@ -343,11 +351,11 @@ def check(
         _check_draws(project.context, scheduler)
     is_drawn = any(project.context.params["draws"] is not None for project in projects)
     if explain is not None:
-        excluded = ("format_name", "reports", "draws", "scheduler", "swept")
+        excluded = ("format_name", "reports", "draws", "scheduler", "swept", "guarding")
         if any(source_of(name) is ParameterSource.COMMANDLINE for name in excluded):
             raise click.UsageError(
-                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
-                "--sweep."
+                "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --guard, "
+                "--scheduler or --sweep."
             )
         _explain(projects, explain, output, changes, today)
         return
@@ -362,7 +370,7 @@ def check(
     if output is None:
         style = style._replace(table_width=table_width())
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    if FORMATS[format_name].is_piecewise and not (named_reports or own_reports or verifying or is_drawn):
+    if FORMATS[format_name].is_piecewise and not (named_reports or own_reports or verifying or is_drawn or guarding):
         from bisar_budget.questions.checks import pieces
 
         texts: dict[str, Piece] = {}
@@ -383,6 +391,7 @@ def check(
         from bisar_budget.questions.drawn_errors import drawn_by
 
         settings: Arguments = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        settings["is_guarded"] = guarding
         found: dict[str, MissionFindings | UnusableMission] = {}
         for project in projects:
             judged_on, arguments = _asked(project, len(projects) > 1, today, changes)
@@ -493,6 +502,8 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
             text = "no" if value is None else f"{value:,} draws"
         elif name == "seed" and context.params["draws"] is not None:
             text = "of each file" if value is None else str(value)
+        elif name == "guarding":
+            text = "yes" if value else None
         elif name in ("strict", "exit_zero", "verifying"):
             text = "yes" if value else "no"
         if text:

@@ -3,6 +3,7 @@
 # Modules that other rooms may use.
 __all__ = [
     "case_table",
+    "guard",
     "images",
     "mission",
     "monte_carlo",

@@ -19,6 +19,7 @@ from bisar_budget.ranges.resolution import Resolution
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
     from bisar_budget.analysis.scene import SceneEdge
+    from bisar_budget.findings.guard import Guard
     from bisar_budget.findings.images import ImageEvidence, Verdict
     from bisar_budget.findings.monte_carlo import MonteCarlo
     from bisar_budget.findings.specification import SpecificationSheet
@@ -78,6 +79,7 @@ class MissionFindings(NamedTuple):
     overrides: tuple[Override, ...] = ()  # influences from outside the file on the verdict
     model_doubt: Note = NOTHING  # if the published model judges and does not hold
     confidence: Note = NOTHING  # with which requirements are met, if they are met
+    guard: "Guard | None" = None  # probabilities that verdicts are wrong, if they were asked for
     requirement_texts: Mapping[str, str] = {}  # texts of requirement ids, as the mission states them
 
     def __repr__(self) -> str:

@@ -14,13 +14,14 @@ from bisar_budget.mission.model import (
     MISSION,
     Mission,
     PartFile,
+    UncertainFigure,
     flies_on_earth,
     names_files,
     names_parts,
     names_requirements,
 )
 from bisar_budget.mission.readers import INVALID, Invalid
-from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
+from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, has_uncertainty, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
 # `changes`, `parts` and `paths` are imported in the functions that need them, because most missions do not need them.
@@ -141,6 +142,7 @@ def mission_of(
     if model is not None and isinstance(tree.root.get("allocation"), dict):
         tree.root["allocation"]["model"] = model
     mission: Mission | Invalid = INVALID
+    uncertainties: tuple[UncertainFigure, ...] = ()
     parts: dict[str, PartFile] = {}
     with suppress(UnusableError):
         folder = folder_of(file)
@@ -149,6 +151,10 @@ def mission_of(
             from bisar_budget.mission.requirement_file import add_requirements
 
             add_requirements(tree, read_path or reader_of(folder), changes)
+        if has_uncertainty(tree.root):
+            from bisar_budget.mission.uncertain import take_uncertainties
+
+            uncertainties = take_uncertainties(tree)
         mission = MISSION.read(tree.root, (), tree.report)
         if mission is not INVALID and mission.requirements.has_confidence:
             _report_two_confidences(tree)
@@ -183,7 +189,7 @@ def mission_of(
         raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     finished = mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes))
-    finished = finished._replace(parts=tuple(parts.values()))
+    finished = finished._replace(parts=tuple(parts.values()), uncertainties=uncertainties)
     return finished if model is None else finished._replace(allocation=finished.allocation._replace(model=model))
 
 

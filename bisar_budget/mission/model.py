@@ -32,6 +32,7 @@ from bisar_budget.mission.readers import (
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
+    UNCERTAINTY_TEXT,
     Choice,
     Day,
     Glob,
@@ -576,6 +577,17 @@ class PartFile(NamedTuple):
     data: bytes
 
 
+class UncertainFigure(NamedTuple):
+    """A figure whose standard uncertainty the file states, by its key; three axes with one value are one figure.
+
+    `relative_uncertainty` is the standard uncertainty divided by the size of the figure. For a level it is that of
+    the amplitude: 1 dB is 0.115.
+    """
+
+    key: str
+    relative_uncertainty: float
+
+
 class Mission(NamedTuple):
     """A mission file that can be used.
 
@@ -596,6 +608,8 @@ class Mission(NamedTuple):
     taken : tuple of TakenFigure
         Figures that the mission takes from parts. A file that stated these figures itself would describe the same
         mission.
+    uncertainties : tuple of UncertainFigure
+        Figures that the file states with an uncertainty. Only `check --guard` uses them.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -614,7 +628,7 @@ class Mission(NamedTuple):
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "Motion error common to both platforms.")
     ] = None
-    timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
+    timing_error: Annotated[TimingError, Key(Section(TimingError), UNCERTAINTY_TEXT)] = TimingError()
     synchronization: Annotated[
         Synchronization | None,
         Key(SYNCHRONIZATION, "How the receiver follows the transmitter's oscillator."),
@@ -622,7 +636,7 @@ class Mission(NamedTuple):
     propagation: Annotated[
         Propagation | None, Key(PROPAGATION, "Delays in the air, on the way to the scene and back.")
     ] = None
-    other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
+    other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError), UNCERTAINTY_TEXT)] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[
         Mapping[str, tuple[str, ...]],
@@ -654,6 +668,7 @@ class Mission(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
     taken: tuple[TakenFigure, ...] = ()
+    uncertainties: tuple[UncertainFigure, ...] = ()
 
     def __repr__(self) -> str:
         """Text on one line with the path of the file and the name of the mission."""

@@ -55,6 +55,7 @@ from bisar_budget.mission.readers import (
     LATITUDE,
     RANGE,
     SNAP_COMPONENT,
+    UNCERTAINTY_TEXT,
     VELOCITY,
     Choice,
     Distributions,
@@ -660,7 +661,7 @@ class Platform(NamedTuple):
         float | None, Key(DIRECTION, "Direction of motion, counted like azimuth (not a compass heading).")
     ] = None
     climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
-    motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
+    motion_error: Annotated[MotionError, Key(Section(MotionError), UNCERTAINTY_TEXT)] = MotionError()
     oscillator: Annotated[Oscillator | None, Key(OSCILLATOR, "The oscillator and its noise.")] = None
     path: FlownPath | None = None
 

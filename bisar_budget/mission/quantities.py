@@ -53,6 +53,7 @@ from bisar_budget.mission.readers import (
     Triple,
 )
 from bisar_budget.mission.tree import Content, Tree, read_tree
+from bisar_budget.mission.uncertain import take_uncertainties
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -162,9 +163,14 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> JsonObject:
-    """Content of a mission file with the values set by `--set` options, as nested lists and mappings of strings."""
+    """Content of a mission file with the values set by `--set` options, as nested lists and mappings of strings.
+
+    Uncertainties of figures are left out.
+    """
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
+    if mission.uncertainties:
+        take_uncertainties(tree)
     root: JsonObject = tree.root
     return root
 

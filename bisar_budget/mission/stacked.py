@@ -72,7 +72,8 @@ def _bare(mission: Mission) -> Mission:
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)
     no_sources: SectionValues = {"file": "", "places": {}, "data": b"", "changes": (), "parts": (), "taken": ()}
-    return mission._replace(name="", document=Document(), requirement_ids={}, requirement_texts={}, **no_sources)
+    mission = mission._replace(requirement_ids={}, requirement_texts={}, uncertainties=())
+    return mission._replace(name="", document=Document(), **no_sources)
 
 
 def _children(value: SectionValue) -> tuple[object, ...] | None:

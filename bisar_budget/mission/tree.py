@@ -25,7 +25,7 @@ from bisar_budget.faults import (
     upwards,
 )
 from bisar_budget.mission.readers import INVALID, MISSING
-from bisar_budget.units import unit_behind
+from bisar_budget.units import UNCERTAINTY_MARKS, unit_behind
 
 MAX_BYTES = 1 << 20  # of a file; a mission file has a few kilobytes
 MAX_NESTING_LEVEL = 20  # containers inside each other; the schema needs 9
@@ -316,6 +316,15 @@ def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
     if not isinstance(tree.root, dict):
         raise MissionError(file, tuple(tree.faults))
     return tree
+
+
+def has_uncertainty(value: Content) -> bool:
+    """Whether a text, or a text inside a section or list, contains the sign of an uncertainty, `±` or `+/-`."""
+    if isinstance(value, str):
+        return any(mark in value for mark in UNCERTAINTY_MARKS)
+    if isinstance(value, dict):
+        return any(map(has_uncertainty, value.values()))
+    return isinstance(value, list) and any(map(has_uncertainty, value))
 
 
 def _copied(value: Content) -> Content:

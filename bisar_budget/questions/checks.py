@@ -52,6 +52,7 @@ def check(
     verify: bool = False,
     sweep: Mapping[str, object] | None = None,
     outside: Outside | None = None,
+    guard: bool = False,
 ) -> "CheckResult":
     """Check a mission against its requirements.
 
@@ -74,6 +75,9 @@ def check(
         and the report shows the results.
     outside : Outside, optional
         Origins of `model` and `date` to name in the report. By default both come from the caller.
+    guard : bool
+        Whether to compute the probability that each verdict is wrong, because figures of the mission have a stated
+        uncertainty. The mission is checked twice more for each of these figures.
 
     Raises
     ------
@@ -92,6 +96,10 @@ def check(
         from bisar_budget.sampling.probability import monte_carlo as drawn
 
         findings = findings._replace(monte_carlo=drawn(findings.analysed(), *drawn_here(monte_carlo, seed)))
+    if guard:
+        from bisar_budget.questions.guarding import with_guard
+
+        findings = cast("MissionFindings", with_guard(findings, today))
     if verify:
         findings = cast("MissionFindings", with_images([findings], today, is_illustrated=True)[0])
     if sweep:
@@ -111,6 +119,7 @@ def checked(
     is_verified: bool = False,
     swept: Sequence[str] = (),
     is_illustrated: bool = False,
+    is_guarded: bool = False,
 ) -> list[CheckedMission]:
     """Check mission files, and add the optional parts of the report that were requested.
 
@@ -130,19 +139,34 @@ def checked(
         Strings `KEY=VALUES` with the values of one or two keys for a trade study; empty if no study is requested.
     is_illustrated : bool
         Whether the report can show pictures. Analyses and images are then kept, and specifications are added.
+    is_guarded : bool
+        Whether to add the probabilities that verdicts are wrong, because figures have a stated uncertainty.
 
     Raises
     ------
     QuestionError
         The values of `swept` do not fit a mission; the message begins with the name of its file.
     """
-    keep = whole if is_verified or is_illustrated else without_analysis
+    keep: Callable[[CheckedMission], CheckedMission] = whole if is_verified or is_illustrated else without_analysis
+    if is_guarded and keep is without_analysis:
+        keep = partial(_guarded_alone, today=today)
     results = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
+    if is_guarded and keep is whole:
+        from bisar_budget.questions.guarding import with_guard
+
+        results = [with_guard(findings, today) for findings in results]
     if is_verified:
         results = with_images(results, today, is_illustrated=is_illustrated)
     if swept:
         results = with_studies(results, swept, model, today)
     return with_sheets(results, model, today) if is_illustrated else results
+
+
+def _guarded_alone(findings: CheckedMission, today: dt.date) -> CheckedMission:
+    """Add the probabilities that verdicts are wrong to the findings, and remove their analysis."""
+    from bisar_budget.questions.guarding import with_guard
+
+    return without_analysis(with_guard(findings, today))
 
 
 def pieces(

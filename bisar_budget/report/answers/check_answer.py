@@ -7,7 +7,13 @@ from bisar_budget.findings.row import worst_first
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.answers import Records
-from bisar_budget.report.answers.shared_blocks import mission_chapter, mission_document, opening, requirement_table
+from bisar_budget.report.answers.shared_blocks import (
+    guard_blocks,
+    mission_chapter,
+    mission_document,
+    opening,
+    requirement_table,
+)
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.formats.csv_table import CSV_COLUMNS, lines_of
 from bisar_budget.report.renderers import html, markdown, xlsx
@@ -56,6 +62,7 @@ def brief(findings: MissionFindings) -> doc.AnswerDocument:
     blocks: list[doc.Block] = [
         opening(findings, verdict(findings), findings.status, rule_words(findings)),
         requirement_table(findings),
+        *guard_blocks(findings.guard),
         doc.TextTable(
             "Rows",
             "Rows, worst first",

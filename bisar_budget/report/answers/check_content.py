@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from bisar_budget.faults import Fault
+from bisar_budget.findings.guard import Guard
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
 from bisar_budget.findings.monte_carlo import MonteCarlo
@@ -149,6 +150,7 @@ def _mission(mission: MissionFindings) -> dict[str, object]:
         "monte_carlo": None if mission.monte_carlo is None else monte_carlo_item(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict_item(verdict) for verdict in mission.verdicts],
         **({} if mission.study is None else {"sweep": _study(mission.study)}),
+        **({} if mission.guard is None else {"guard": _guard(mission.guard)}),
         **({"requirement_texts": dict(mission.requirement_texts)} if mission.requirement_texts else {}),
     }
 
@@ -162,6 +164,13 @@ def _study(study: TradeStudy) -> dict[str, object]:
         "waived_by": list(study.waived_by),
         "not_evaluated": study.unevaluated,
         "without_mission": study.missing,
+    }
+
+
+def _guard(guard: Guard) -> dict[str, object]:
+    return {
+        "requirements": [asdict(requirement) for requirement in guard.requirements],
+        "figures": [figure._asdict() for figure in guard.figures],
     }
 
 

@@ -42,6 +42,7 @@ from bisar_budget.report.words.sentences import (
     shown_use,
     use_words,
 )
+from bisar_budget.report.words.wrong_verdicts import guard_sentences
 from bisar_budget.units import format_quantity
 
 _PAGE_LINES = 45  # length of a report whose passing rows can be left out
@@ -126,12 +127,17 @@ def _opening(mission: MissionFindings) -> doc.Block:
 
 
 def _requirements(mission: MissionFindings) -> doc.Block:
-    """The table of requirements, the effects that no requirement judges, and the number of declared errors."""
+    """The table of requirements, and sentences below it.
+
+    They give the probabilities that verdicts are wrong, the effects that no requirement judges, and the number of
+    declared errors.
+    """
     texts = []
     for effect in unjudged_effects(mission):
         rows = ", ".join(row.id if row.line is None else f"{row.id} of line {row.line}" for row in effect.rows)
         texts.append(f"Not judged: {effect.text} ({rows}).")
-    items = doc.Items([[text] for text in (*texts, declared_words(mission.kinds))])
+    guarded = () if mission.guard is None else guard_sentences(mission.guard)
+    items = doc.Items([[text] for text in (*guarded, *texts, declared_words(mission.kinds))])
     return doc.Close([requirement_table(mission, has_texts=True), items])
 
 

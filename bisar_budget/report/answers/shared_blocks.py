@@ -1,16 +1,20 @@
 """Parts of documents that all answers have in common: opening, chapter of a mission, table of requirements."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 from bisar_budget import __version__
 from bisar_budget.faults import printable
+from bisar_budget.findings.guard import Guard
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
-from bisar_budget.report.words.sentences import own_id
+from bisar_budget.report.words.sentences import own_id, sentence
+from bisar_budget.report.words.wrong_verdicts import guard_sentences, risk_words, uncertain_use, verdict_words
 
 
 def opening(
@@ -68,6 +72,33 @@ def requirement_table(findings: MissionFindings, *, has_texts: bool = False) -> 
     ]
     caption = "Requirements and their verdicts"
     return doc.TextTable("Requirements", caption, heads, rows, below=below if has_texts else ())
+
+
+def guard_blocks(guard: Guard | None) -> Iterator[doc.Block]:
+    """Yield the table with the probabilities that the verdicts are wrong.
+
+    Sentences below it are about requirements without such a probability. There is nothing to show if `guard` is None,
+    because the probabilities were not asked for.
+    """
+    if guard is None:
+        return
+    quantified = [requirement for requirement in guard.requirements if requirement.probability is not None]
+    if quantified:
+        heads = doc.heads("requirement", *doc.numbers("use", "probability that the verdict is wrong"), "verdict")
+        lines: list[doc.Line] = [
+            [
+                sentence(REQUIREMENT_NAMES[requirement.key]),
+                uncertain_use(requirement),
+                risk_words(requirement),
+                verdict_words(requirement),
+            ]
+            for requirement in quantified
+        ]
+        caption = "Probability that a verdict is wrong, from the stated uncertainties of figures"
+        yield doc.TextTable("Guard", caption, heads, lines)
+    unknown = [requirement for requirement in guard.requirements if requirement.probability is None]
+    if unknown or not quantified:
+        yield doc.Items([[text] for text in guard_sentences(replace(guard, requirements=tuple(unknown)))])
 
 
 def _decided_by(line: RequirementLine) -> doc.Text:

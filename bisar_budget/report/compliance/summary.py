@@ -18,6 +18,7 @@ from bisar_budget.mission.propagation import Propagation
 from bisar_budget.mission.work_tree import WorkTree
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
+from bisar_budget.report.answers.shared_blocks import guard_blocks
 from bisar_budget.report.compliance.annex import annex
 from bisar_budget.report.compliance.overview import OverviewEntry, overview
 from bisar_budget.report.compliance.record import document_facts, has_record, record
@@ -292,6 +293,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
         yield doc.Paragraph(doubt)
     yield doc.Paragraph(f"{sentence(verdict(findings))}. {sentence(rule_words(findings))}.")
     yield _requirements(page)
+    yield from guard_blocks(findings.guard)
     facts: list[tuple[doc.Text, doc.Text]] = [
         ("Not judged", f"{effect.text} ({', '.join(row.id for row in effect.rows)})")
         for effect in unjudged_effects(findings)
