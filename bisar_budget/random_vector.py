@@ -102,7 +102,7 @@ class RandomVector(NamedTuple):
 
     def along(self, way: Floats) -> "RandomVector":
         """Component of the vector along a unit vector (m,), as a random vector of one component."""
-        return RandomVector(*(part @ way[:, None] for part in self))
+        return RandomVector(*(vectors @ way[:, None] for vectors in self))
 
     def probability(self, limit: float) -> float:
         """Probability that the length of the vector is at most a limit, in the unit of the vector."""

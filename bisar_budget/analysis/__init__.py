@@ -9,6 +9,7 @@ __all__ = [
     "spread",
     "together",
     "tone_displacement",
+    "totals",
     "variables",
     "vibration_limits",
 ]

@@ -75,22 +75,28 @@ class Totals:
         """
         variables = [each for each in self._of(model, case) if is_member(each.owner)]
         columns, weights = _columns(requirement, _hidden_count(variables, plain(gain, case)), plain(gain, case))
-        parts: dict[str, list[Floats]] = {"normal": [], "uniform": [], "bound": [], "tone": [], CONSTANT: []}
+        vectors_of: dict[str, list[Floats]] = {
+            "normal": [],
+            "uniform": [],
+            "bound": [],
+            "tone": [],
+            CONSTANT: [],
+        }
         for variable in variables:
             vector = (
                 _taken(variable.effects, columns) * weights * self._scale(model, requirement, variable, case, gain)
             )
             if variable.distribution == "tone":
-                parts["tone"].append(np.array((vector, _taken(variable.quadrature, columns) * weights)))
+                vectors_of["tone"].append(np.array((vector, _taken(variable.quadrature, columns) * weights)))
             elif variable.distribution == "uniform":
-                parts["uniform"].append(vector * _UNIFORM_WIDTH)
+                vectors_of["uniform"].append(vector * _UNIFORM_WIDTH)
             else:
-                parts[variable.distribution].append(vector)
-        mean = sum(parts.pop(CONSTANT), np.zeros(len(columns)))
+                vectors_of[variable.distribution].append(vector)
+        mean = sum(vectors_of.pop(CONSTANT), np.zeros(len(columns)))
         shapes = {"tone": (-1, 2, len(columns))}
         arrays = {
             name: np.array(vectors, dtype=float).reshape(shapes.get(name, (-1, len(columns))))
-            for name, vectors in parts.items()
+            for name, vectors in vectors_of.items()
         }
         return RandomVector(mean, **arrays)
 
@@ -146,7 +152,7 @@ class Totals:
             distribution = "normal" if error.is_covered else "bound"
             for index, sigma in enumerate((effect.quadratic, effect.cubic, effect.east, effect.north)):
                 if sigma and math.isfinite(sigma):
-                    effects = tuple(sigma * size if place == index else 0.0 for place in range(FIRST_HIDDEN_INDEX))
+                    effects = tuple(sigma * size if column == index else 0.0 for column in range(FIRST_HIDDEN_INDEX))
                     published.append(
                         Variable(f"{error.id}.{index}", error.id, error.owner, distribution, (), effects)
                     )
@@ -159,11 +165,10 @@ class Totals:
             published.append(each._replace(effects=(*effects, 0.0, 0.0), quadrature=(*quadrature, 0.0, 0.0)))
             seen.add(each.of)
         for row_id, tone in moved.items():
-            for index, part in enumerate(tone.published):
-                constant, linear, quadratic, cubic = np.nan_to_num(part.orders[:, None] * part.per_metre)[
-                    ..., case if part.orders.shape[-1] > 1 else 0
-                ]
-                ahead, behind = constant - quadratic, linear - cubic
+            for index, tone_part in enumerate(tone.published):
+                ahead, behind = (
+                    np.nan_to_num(wave[:, case if wave.shape[-1] > 1 else 0]) for wave in tone_part.waves
+                )
                 published.append(
                     Variable(
                         f"{row_id}.published{index}",

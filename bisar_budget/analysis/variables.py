@@ -152,8 +152,8 @@ class ErrorVariables:
         further = (0.0,) * (_TURNED_PART_COUNT * bool(self.exact.is_turned[self._column(case)]))
         for error in self.analysis.random:
             if error.biased is not None and not error.counted_in:
-                one = error.biased.of(case)
-                effects = (*(one.bias * one.full[:, 0]).tolist(), *further)
+                biased = error.biased.of(case)
+                effects = (*(biased.bias * biased.full[:, 0]).tolist(), *further)
                 yield Variable(f"{error.id}.bias", error.id, error.owner, CONSTANT, (), effects)
 
     # ---------------------------------------------------------------- stated errors

@@ -102,12 +102,12 @@ def held_effect(
     that spreads over the image. `coverage` is the coverage factor that `effect` includes. `judged_effect` is the
     effect at the quantiles of the requirements; if it is None, `effect` is used.
     """
-    held = effect if judged_effect is None else judged_effect
-    held = held._replace(quadratic=held.judged(gain))
+    limited = effect if judged_effect is None else judged_effect
+    limited = limited._replace(quadratic=limited.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
-        return held
+        return limited
     cubic = effect.cubic / coverage
-    return held._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
+    return limited._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
 
 
 def judged_effect_of(mission: Mission, error: RandomError, model: str, gain: PerCase = 1.0) -> RandomEffect:
@@ -181,8 +181,8 @@ class RandomRows:
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
         sizes = np.full((len(RANDOM_REQUIREMENTS), len(owners), self.judging.cases), math.inf)
         coverage = self._table([error.coverage(self.mission) for error in self.errors])
-        held = held_effect(self.mission, effects, coverage, gain, judged_effects)
-        for row, size in zip(sizes, sizes_at(held, limits), strict=True):
+        limited = held_effect(self.mission, effects, coverage, gain, judged_effects)
+        for row, size in zip(sizes, sizes_at(limited, limits), strict=True):
             row[:] = size
         return sizes, self._with_biases(model, limits, sizes, declared)
 
@@ -196,7 +196,7 @@ class RandomRows:
         with np.errstate(all="ignore"):
             uses = np.where(np.isnan(declared), math.nan, declared / sizes.min(axis=0))
         confidence_of, gain = self.mission.requirements.confidence_of, self.allocation.autofocus_gain
-        places = [RANDOM_REQUIREMENTS.index(key) for key in (QUADRATIC, CUBIC, LOCATION)]
+        rows = [RANDOM_REQUIREMENTS.index(key) for key in (QUADRATIC, CUBIC, LOCATION)]
         for index, error in enumerate(self.errors):
             if error.biased is not None:
                 of_error = [
@@ -204,8 +204,8 @@ class RandomRows:
                     for limit in (limits.quadratic, limits.cubic, limits.displacement)
                 ]
                 uses[index], of_random_part = error.uses(model, of_error, confidence_of, gain)
-                for place, size in zip(places, of_random_part, strict=True):
-                    sizes[place, index] = size
+                for row, size in zip(rows, of_random_part, strict=True):
+                    sizes[row, index] = size
                 spread = sizes[RANDOM_REQUIREMENTS.index(ISLR), index]
                 uses[index] = np.maximum(uses[index], declared[index] / spread)
         return uses

@@ -194,8 +194,7 @@ def _entry(
         reason = decider.reason
     judges = [row for row, does_judge in zip(rows, state.judges[:, case.place], strict=True) if row and does_judge]
     path = ("requirements", key)
-    distribution = _distribution(key, judged, case) if not is_open and key in LIMITING_REQUIREMENTS else {}
-    return JudgedRequirement(
+    requirement = JudgedRequirement(
         key=key,
         value=value,
         unit=REQUIREMENT_UNITS[key],
@@ -215,36 +214,38 @@ def _entry(
         use_row=None if user is None or use is None else user.id,
         requirement_ids=mission.requirement_ids.get(id_of_requirement(key), ()),
         confidence=mission.requirements.confidence_of(key),
-        **distribution,
     )
+    is_distributed = not is_open and key in LIMITING_REQUIREMENTS
+    return _with_distribution(requirement, judged, case) if is_distributed else requirement
 
 
-def _distribution(key: str, judged: JudgedMission, case: Case) -> dict[str, Any]:
-    """Return the fields of a requirement that describe the distribution of the quantity that it limits.
+def _with_distribution(requirement: JudgedRequirement, judged: JudgedMission, case: Case) -> JudgedRequirement:
+    """Add the distribution of the quantity that a requirement limits to the requirement.
 
     It is the distribution by the gating model, of all declared errors together, whatever the mission's rule. The
-    result is empty if no image forms with an error of the declared size, or if no error is declared.
+    requirement is returned unchanged if no image forms with an error of the declared size, or if no error is
+    declared.
     """
-    model, totals = next(iter(judged.families)), judged.totals
+    key, model, totals = requirement.key, next(iter(judged.families)), judged.totals
     together = judged.analysis.together(model)
     if not (together.phases or together.is_placed):
-        return {}
+        return requirement
     of_all = together.moved("rss") if key == LOCATION else together.judged(together.phases, "rss")
     if not math.isfinite(case.number(of_all)):
-        return {}
+        return requirement
     vector, limit = totals.of_all(model, key, case.place), getattr(case.mission.requirements, key)
-    fields: dict[str, Any] = {"percentiles": _percentiles(vector)}
-    if limit is not None:
-        fields["probability"] = vector.probability(limit)
+    requirement = requirement._replace(
+        percentiles=_percentiles(vector), probability=None if limit is None else vector.probability(limit)
+    )
     if key == LOCATION:
         east, north = (case.number(component) for component in case.geometry.range_gradient)
         along = np.array((east, north)) / math.hypot(east, north)
         across = np.array((-along[1], along[0]))
-        fields |= {
-            "percentiles_range": _percentiles(vector.along(along)),
-            "percentiles_azimuth": _percentiles(vector.along(across)),
-        }
-    return fields
+        requirement = requirement._replace(
+            percentiles_range=_percentiles(vector.along(along)),
+            percentiles_azimuth=_percentiles(vector.along(across)),
+        )
+    return requirement
 
 
 _PERCENTILE_NAMES = tuple(f"{100 * confidence:g}" for confidence in PERCENTILES)

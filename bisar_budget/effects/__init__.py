@@ -7,6 +7,7 @@ __all__ = [
     "combined",
     "declared",
     "effect",
+    "error_quantiles",
     "navigation_errors",
     "oscillator_acceleration",
     "oscillator_tones",

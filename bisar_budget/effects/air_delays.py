@@ -248,8 +248,8 @@ def _biased(seen: SensorCases, bias: PerCase, delay: str, moving: Floats, at_mid
     constant, linear, quadratic, cubic = exact.fit @ at_mid_aperture
     (a, b), (c, d) = seen.plane.adjugate
     scale = 1 / np.where(seen.plane.is_singular, math.nan, seen.plane.determinant)
-    places = [(u * constant + v * linear / exact.half) * scale for u, v in ((a, b), (c, d))]
-    return BiasEffects(bias, np.array([exact.k * quadratic, exact.k * cubic, *places]), full)
+    displacement = [(u * constant + v * linear / exact.half) * scale for u, v in ((a, b), (c, d))]
+    return BiasEffects(bias, np.array([exact.k * quadratic, exact.k * cubic, *displacement]), full)
 
 
 def correlation_time_of(mission: Mission, owner: str) -> PerCase | None:

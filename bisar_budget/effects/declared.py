@@ -566,7 +566,7 @@ class ErrorBlock:
         reaching: list[Floats | None] = [None] * len(limits)
         for index, (limit, confidence) in enumerate(zip(limits, confidences, strict=True)):
             if limit is not None:
-                alone = [limit if place == index else None for place in range(len(limits))]
+                alone = [limit if other_index == index else None for other_index in range(len(limits))]
                 reached = self.reaching(model, alone, is_complete=is_complete)
                 reaching[index] = reached.smallest
                 sizes[index] = self._by_error(allowable_size, reached.smallest, confidence)

@@ -20,7 +20,7 @@ from bisar_budget.random_vector import RandomVector
 
 _STANDARD = NormalDist()
 _VARIANCE_DIGITS = 7  # of a share of the whole variance; a quantile needs fewer
-_STEP_COUNT = 60  # bisections, which leave 1e-18 of the first interval
+_BISECTION_COUNT = 60  # bisections, which leave 1e-18 of the first interval
 # Largest multiple of the distance to a limit at which a sigma is searched for. Beyond it, the probability that the
 # error keeps the limit is below 50 % for every bias.
 _WIDEST_RATIO = 2.0
@@ -93,7 +93,7 @@ def _normal_quantile(sigma: float, mean: float, confidence: float) -> float:
     if not sigma or not mean or math.isnan(sigma) or math.isnan(mean):
         return mean + sigma * quantile_factor("normal", confidence)
     low, high = (mean + sigma * _STANDARD.inv_cdf(level) for level in (confidence, (1 + confidence) / 2))
-    for _ in range(_STEP_COUNT):
+    for _ in range(_BISECTION_COUNT):
         middle = (low + high) / 2
         low, high = (middle, high) if _within(middle, sigma, mean) < confidence else (low, middle)
     return high
@@ -106,7 +106,7 @@ def _largest_sigma(limit: float, mean: float, confidence: float) -> float:
     if mean >= limit:
         return 0.0
     low, high = 0.0, _WIDEST_RATIO * limit
-    for _ in range(_STEP_COUNT):
+    for _ in range(_BISECTION_COUNT):
         middle = (low + high) / 2
         low, high = (middle, high) if _within(limit, middle, mean) >= confidence else (low, middle)
     return low
@@ -121,9 +121,9 @@ def normal_length_ratio(covariance: Floats, confidence: float) -> Floats:
     _, _, cases = covariance.shape
     total = np.einsum("iic->c", covariance)
     ratios = np.full(cases, quantile_factor("normal", confidence))
-    is_known = np.flatnonzero(np.isfinite(total) & (total > 0))
-    variances = np.linalg.eigvalsh(np.moveaxis(covariance[..., is_known] / total[is_known], 2, 0))
-    for case, principal in zip(is_known, np.round(variances, _VARIANCE_DIGITS), strict=True):
+    has_variance = np.flatnonzero(np.isfinite(total) & (total > 0))
+    variances = np.linalg.eigvalsh(np.moveaxis(covariance[..., has_variance] / total[has_variance], 2, 0))
+    for case, principal in zip(has_variance, np.round(variances, _VARIANCE_DIGITS), strict=True):
         ratios[case] = _length_ratio(tuple(principal.tolist()), confidence)
     return ratios
 

@@ -276,15 +276,15 @@ class RandomError(NamedTuple):
                 east=effect.east * self.declared,
                 north=effect.north * self.declared,
             )
-        phase, edge, place = (
-            judged_size(self.distribution, part * self.declared, bias, confidence_of(key))
-            for key, part, bias in zip(
-                (QUADRATIC, CUBIC, LOCATION), self._parts(model, gain), self.biased.sizes(model, gain), strict=True
+        phase, edge, length = (
+            judged_size(self.distribution, sigma * self.declared, bias, confidence_of(key))
+            for key, sigma, bias in zip(
+                (QUADRATIC, CUBIC, LOCATION), self._sigmas(model, gain), self.biased.sizes(model, gain), strict=True
             )
         )
-        return effect._replace(quadratic=phase, hidden=0.0, cubic=edge, east=place, north=0.0 * place)
+        return effect._replace(quadratic=phase, hidden=0.0, cubic=edge, east=length, north=0.0 * length)
 
-    def _parts(self, model: str, gain: PerCase) -> tuple[PerCase, PerCase, PerCase]:
+    def _sigmas(self, model: str, gain: PerCase) -> tuple[PerCase, PerCase, PerCase]:
         """Sigmas of judged phase, cubic phase and length of the displacement due to one unit of the error."""
         effect = self.effect(model)
         return effect.judged(gain), effect.cubic, effect.displacement
@@ -307,22 +307,22 @@ class RandomError(NamedTuple):
         uses: Floats = np.zeros(np.shape(judged.quadratic))
         sizes: list[PerCase] = []
         values = (judged.quadratic, judged.cubic, judged.displacement)
-        parts = zip(
+        rows = zip(
             limits,
             values,
-            self._parts(model, gain),
+            self._sigmas(model, gain),
             self.biased.sizes(model, gain),
             (QUADRATIC, CUBIC, LOCATION),
             strict=True,
         )
-        for limit, value, part, bias, key in parts:
+        for limit, value, sigma, bias, key in rows:
             if limit is None:
                 sizes.append(math.inf)
                 continue
             uses = np.maximum(uses, value / limit)
             most = allowable_size(self.distribution, limit, bias, confidence_of(key))
             with np.errstate(all="ignore"):
-                sizes.append(np.where(np.asarray(part) > 0, most / part, np.where(bias > limit, 0.0, math.inf)))
+                sizes.append(np.where(np.asarray(sigma) > 0, most / sigma, np.where(bias > limit, 0.0, math.inf)))
         return uses, sizes
 
     @property
@@ -342,13 +342,13 @@ class RandomError(NamedTuple):
         if not self.is_covered or not any((quadratic, cubic, location)):
             return effect
         of_phase = self._quantile_ratio(effect, (QUADRATIC_INDEX, *HIDDEN_INDICES), quadratic, gain)
-        of_place = self._quantile_ratio(effect, PLACE_INDICES, location)
+        of_displacement = self._quantile_ratio(effect, PLACE_INDICES, location)
         return effect._replace(
             quadratic=effect.quadratic * of_phase,
             hidden=effect.hidden * of_phase,
             cubic=effect.cubic * quantile_factor("normal", cubic),
-            east=effect.east * of_place,
-            north=effect.north * of_place,
+            east=effect.east * of_displacement,
+            north=effect.north * of_displacement,
         )
 
     @staticmethod

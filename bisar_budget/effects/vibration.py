@@ -367,7 +367,7 @@ class DeclaredPhase(NamedTuple):
     coverage: PerCase = 1.0
     is_there: PerCaseFlag = True
     hidden_rad: PerCase = 0.0
-    rms_cubic_rad: Any = None
+    rms_cubic_rad: PerCase | None = None
 
     @property
     def expected_cubic_rad(self) -> PerCase:

@@ -73,7 +73,7 @@ def date_schema(pattern: str) -> JsonObject:
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
-class Beside(NamedTuple):
+class WithContent(NamedTuple):
     """A value, and content that the file states beside it, such as the bias beside a sigma.
 
     A section keeps the value under the key, and the content under the same key in its field `field`, a mapping.
@@ -756,7 +756,7 @@ class Section(Reader[T_co]):
             report(path, Problem("must be a mapping of keys to values", f"accepted: {', '.join(self.keys)}"))
             return INVALID
         is_valid = True
-        values: dict[str, Any] = {}
+        values: dict[str, SectionValue] = {}
         for name, item in value.items():
             key = self.keys.get(name)
             if key is None:
@@ -766,7 +766,7 @@ class Section(Reader[T_co]):
                 is_valid = False
                 continue
             value_read = item if item is INVALID else key.reader.read(item, (*path, name), report)
-            if isinstance(value_read, Beside):
+            if isinstance(value_read, WithContent):
                 contents = values.setdefault(value_read.field, {})
                 contents[name] = value_read.content
                 value_read = value_read.value
@@ -875,7 +875,7 @@ class OneOf(Reader[T_co]):
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
-class _Pair(Section[Any]):
+class _Pair(Section[SectionValue]):
     """A section that states a number by two keys. Its schema is named by the kind of number."""
 
     def __init__(self, name: str, meaning: str, keys: dict[str, Key], required: tuple[str, ...] = ()) -> None:
@@ -918,7 +918,7 @@ class _SizeAndBias(_Pair):
         super().__init__(name, meaning, keys)
         self.unstated = unstated
 
-    def read(self, value: object, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> SectionValue:
         """Read both; a size that the file does not state has the value `unstated`."""
         pair = super().read(value, path, report)
         if pair is INVALID:
@@ -926,10 +926,10 @@ class _SizeAndBias(_Pair):
         if not pair:
             report(path, Problem("states neither sigma nor bias", "accepted: {sigma: …, bias: …}"))
             return INVALID
-        return Beside(pair.get(SIZE_FIELD, self.unstated), BIAS_FIELD, pair.get(BIAS_FIELD))
+        return WithContent(pair.get(SIZE_FIELD, self.unstated), BIAS_FIELD, pair.get(BIAS_FIELD))
 
 
-class WithBias(OneOf[Any]):
+class WithBias(OneOf[SectionValue]):
     """Reader of the size of an error with an optional bias: a size, or `{sigma: …, bias: …}`.
 
     Parameters
@@ -981,7 +981,7 @@ class _Confidence(Quantity):
             ) from None
 
 
-CONFIDENCE = _Confidence(units.RATIO, ge=0.5, le=0.999999)
+_PROBABILITY = _Confidence(units.RATIO, ge=0.5, le=0.999999)
 
 
 class _LimitAndConfidence(_Pair):
@@ -993,13 +993,13 @@ class _LimitAndConfidence(_Pair):
     def __init__(self, limit: "Quantity", name: str, default: float | None) -> None:
         keys = {
             "limit": Key(limit, "The limit."),
-            CONFIDENCE_FIELD: Key(CONFIDENCE, "Probability with which the limit is kept, 50 % to 99.9999 %."),
+            CONFIDENCE_FIELD: Key(_PROBABILITY, "Probability with which the limit is kept, 50 % to 99.9999 %."),
         }
         required = () if default is not None else ("limit",)
         super().__init__(name, "A limit and the confidence with which it is kept.", keys, required)
         self.default = default
 
-    def read(self, value: object, path: KeyPath, report: Report) -> Any:
+    def read(self, value: object, path: KeyPath, report: Report) -> SectionValue:
         """Read both; without a confidence, the limit is that of the errors as they are declared."""
         pair = super().read(value, path, report)
         if pair is INVALID:
@@ -1010,10 +1010,10 @@ class _LimitAndConfidence(_Pair):
         confidence = pair.get(CONFIDENCE_FIELD)
         # As text it is a part of the form of a mission: cases with different confidences are not one array.
         text = None if confidence is None else repr(confidence)
-        return Beside(pair.get("limit", self.default), CONFIDENCE_FIELD, text)
+        return WithContent(pair.get("limit", self.default), CONFIDENCE_FIELD, text)
 
 
-class WithConfidence(OneOf[Any]):
+class WithConfidence(OneOf[SectionValue]):
     """Reader of a requirement: a limit, or `{limit: …, confidence: …}`.
 
     `default` is the limit of a section that states only a confidence; None if such a section is refused.
@@ -1200,18 +1200,18 @@ PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
 PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Level(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
-_DISTRIBUTION = Choice("normal", "uniform", "bound")
+_DISTRIBUTION_WORD = Choice("normal", "uniform", "bound")
 
 
 class Distributions(NamedTuple):
     """Distributions of the errors of a motion, one for each kind of error."""
 
-    position: Annotated[str, Key(_DISTRIBUTION)] = "normal"
-    velocity: Annotated[str, Key(_DISTRIBUTION)] = "normal"
-    acceleration: Annotated[str, Key(_DISTRIBUTION)] = "normal"
+    position: Annotated[str, Key(_DISTRIBUTION_WORD)] = "normal"
+    velocity: Annotated[str, Key(_DISTRIBUTION_WORD)] = "normal"
+    acceleration: Annotated[str, Key(_DISTRIBUTION_WORD)] = "normal"
 
 
-DISTRIBUTION = either(dict, Section(Distributions), _DISTRIBUTION)
+DISTRIBUTION = either(dict, Section(Distributions), _DISTRIBUTION_WORD)
 DISTRIBUTION_TEXT = (
     "normal: the values are one sigma; uniform, bound: they are not exceeded. One word, or one for each of position, "
     "velocity and acceleration."

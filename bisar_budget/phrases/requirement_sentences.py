@@ -46,17 +46,17 @@ def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> 
 
 
 @composed
-def stated_confidence(confidences: Mapping[str, float], of_others: str) -> str:
+def stated_confidence(confidences: Mapping[str, float], confidence_of_sizes: str) -> str:
     """Text after `met` that states the confidence of a verdict if requirements state confidences.
 
-    `confidences` are the confidences by the names of the requirements. `of_others` is the confidence that the
-    declared sizes give to other requirements on phases and the location; empty if there are none.
+    `confidences` are the confidences by the names of the requirements. `confidence_of_sizes` is the confidence that
+    the declared sizes give to other requirements on phases and the location; empty if there are none.
     """
     levels = set(confidences.values())
-    if len(levels) == 1 and not of_others:
+    if len(levels) == 1 and not confidence_of_sizes:
         return f"with {_percent(levels.pop())} confidence"
     stated = [f"with {_percent(level)} confidence ({name})" for name, level in confidences.items()]
-    return ", ".join([*stated, *([f"else {of_others}"] if of_others else [])])
+    return ", ".join([*stated, *([f"else {confidence_of_sizes}"] if confidence_of_sizes else [])])
 
 
 def _percent(probability: float) -> str:

@@ -133,7 +133,7 @@ def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None
 # Rules in the order of their strictness, the strictest last.
 _RULES_BY_STRICTNESS = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
-_LIMITS = tuple(key for key in REQUIREMENT_NAMES if key != DECLARE)  # requirements with a size
+_LIMITED_QUANTITIES = tuple(key for key in REQUIREMENT_NAMES if key != DECLARE)  # requirements with a size
 _WIDEST_FIRST = ("normal", "bound", "uniform")
 _LIMITING_NUMBERS = (
     ("autofocus", "n_pull", 1),
@@ -186,7 +186,7 @@ def loosened_settings(before: Mapping[str, object], after: Mapping[str, object])
 
 def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
     """Yield the requirements that were removed, or now have a larger value or a smaller confidence."""
-    for key in _LIMITS:
+    for key in _LIMITED_QUANTITIES:
         path = ("requirements", key)
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
         if old is not None and (new is None or _is_above(new, old)):
