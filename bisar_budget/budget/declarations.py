@@ -15,6 +15,7 @@ import numpy as np
 from bisar_budget.arrays import Booleans, PerCase, PerCaseFlag
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
 from bisar_budget.error_kinds.kind import SourceKind
 from bisar_budget.error_kinds.random_kinds import INERTIAL_FIGURES, NAVIGATION_KIND
 from bisar_budget.error_kinds.registry import kind_of, registered_names
@@ -234,7 +235,8 @@ def _states_clock(mission: Mission) -> bool:
     """Whether the file states a clock error: a term of the timing error, or an error left by synchronisation."""
     sync = mission.synchronization
     setting = () if sync is None else (sync.time_error, sync.frequency_error)
-    return any(term is not None for term in (*mission.timing_error, *setting))
+    terms = map(mission.timing_error.stated, TIMING_KIND.sizes)
+    return any(term is not None for term in (*terms, *setting))
 
 
 def _key_of_clock(mission: Mission) -> list[str]:

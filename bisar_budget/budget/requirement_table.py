@@ -223,7 +223,8 @@ def _distribution(key: str, judged: JudgedMission, case: Case) -> dict[str, Any]
     """Return the fields of a requirement that describe the distribution of the quantity that it limits.
 
     It is the distribution by the gating model, of all declared errors together, whatever the mission's rule. The
-    result is empty if no image forms with an error of the declared size, or if no error is declared.
+    result is empty if no image forms with an error of the declared size, or if no error is declared. The percentiles
+    of a quadratic phase are those before autofocus, and its probability is that with autofocus.
     """
     model, totals = next(iter(judged.families)), judged.totals
     together = judged.analysis.together(model)
@@ -240,7 +241,9 @@ def _distribution(key: str, judged: JudgedMission, case: Case) -> dict[str, Any]
     limit = getattr(case.mission.requirements, key)
     fields: dict[str, Any] = {"percentiles": percentiles()}
     if limit is not None:
-        fields["probability"] = totals.probability(model, key, limit, case.place)
+        gain = case.allocation.autofocus_gain if key == QUADRATIC else 1.0
+        vector = totals.vector(model, key, lambda owner: True, case.place, gain)
+        fields["probability"] = vector.probability(limit * gain)
     if key == LOCATION:
         east, north = (case.number(component) for component in case.geometry.range_gradient)
         along = np.array((east, north)) / math.hypot(east, north)

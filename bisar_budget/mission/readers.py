@@ -904,7 +904,8 @@ class _Pair(Section[Any]):
         return {"$ref": f"#/definitions/{self.name}"}
 
 
-SIZE_FIELD, BIAS_FIELD, CONFIDENCE_FIELD = "sigma", "bias", "confidence"
+SIZE_FIELD, BIAS_FIELD = "sigma", "bias"
+LIMIT_FIELD, CONFIDENCE_FIELD = "limit", "confidence"
 
 
 class _SizeAndBias(_Pair):
@@ -983,10 +984,10 @@ class _LimitAndConfidence(_Pair):
 
     def __init__(self, limit: "Quantity", name: str, default: float | None) -> None:
         keys = {
-            "limit": Key(limit, "The limit."),
+            LIMIT_FIELD: Key(limit, "The limit."),
             CONFIDENCE_FIELD: Key(CONFIDENCE, "Probability with which the limit is kept, 50 % to 99.9999 %."),
         }
-        required = () if default is not None else ("limit",)
+        required = () if default is not None else (LIMIT_FIELD,)
         super().__init__(name, "A limit and the confidence with which it is kept.", keys, required)
         self.default = default
 
@@ -1001,7 +1002,7 @@ class _LimitAndConfidence(_Pair):
         confidence = pair.get(CONFIDENCE_FIELD)
         # As text it is a part of the form of a mission: cases with different confidences are not one array.
         text = None if confidence is None else repr(confidence)
-        return Beside(pair.get("limit", self.default), CONFIDENCE_FIELD, text)
+        return Beside(pair.get(LIMIT_FIELD, self.default), CONFIDENCE_FIELD, text)
 
 
 class WithConfidence(OneOf[Any]):

@@ -1,6 +1,6 @@
 """Parts of documents that all answers have in common: opening, chapter of a mission, table of requirements."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 
 from bisar_budget import __version__
@@ -8,6 +8,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
+from bisar_budget.report.words.confidence import PERCENTILES, percentile_lines, percentile_words
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import own_id
@@ -68,6 +69,17 @@ def requirement_table(findings: MissionFindings, *, has_texts: bool = False) -> 
     ]
     caption = "Requirements and their verdicts"
     return doc.TextTable("Requirements", caption, heads, rows, below=below if has_texts else ())
+
+
+def percentile_blocks(findings: MissionFindings) -> Iterator[doc.Block]:
+    """Yield the table of percentiles of a mission for a terminal, and its explanation, if there are any."""
+    lines = list(percentile_lines(findings))
+    if not lines:
+        return
+    heads = doc.heads("not exceeded in", *doc.numbers(*(f"{name} %" for name in PERCENTILES)))
+    rows = [[line.name, *line.sizes] for line in lines]
+    table = doc.TextTable("Percentiles", "Percentiles of the limited quantities", heads, rows)
+    yield doc.Close([table, doc.Items([[percentile_words(findings)]])])
 
 
 def _decided_by(line: RequirementLine) -> doc.Text:

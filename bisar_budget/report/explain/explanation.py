@@ -75,7 +75,7 @@ from bisar_budget.report.explain.explained_spreading import (
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import own_id, percent, row_limit, row_size, wrapped
+from bisar_budget.report.words.sentences import declared_size, own_id, percent, row_limit, row_size, wrapped
 
 _CONTINUATION_COLUMNS = 3  # additional indent of continued lines, at which no equals sign is expected
 _MAX_UNIT_CHARACTERS = 16  # of a unit after a number
@@ -683,7 +683,7 @@ ROW_STEPS: Mapping[str, Callable[[Analysis, MissionFindings, Row], Iterator[Step
 def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
-    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, findings)}"
+    declared = "" if row.declared is None else f", declared {declared_size(row, findings)}"
     allowable = "" if row.allowable is None else f", allowable {row_limit(row, findings)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)

@@ -16,7 +16,7 @@ from bisar_budget.report import Piece, Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.requirements import requirement_finding, requirement_lines
-from bisar_budget.report.words.sentences import finding, row_size, shown_use, use_words
+from bisar_budget.report.words.sentences import declared_size, finding, shown_use, use_words
 
 _STATUS_COLUMNS = (
     *("id", "text", "key", "limit"),
@@ -52,7 +52,7 @@ def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
 
 def _rows(mission: MissionFindings) -> Iterator[list[str]]:
     for row in mission.rows:
-        sizes = (row.status, row_size(row.declared, row, mission), use_words(shown_use(row)), row.id)
+        sizes = (row.status, declared_size(row, mission), use_words(shown_use(row)), row.id)
         result = [*sizes, mission.file, finding(row, mission), overrides_words(mission)]
         for own_id in row.requirement_ids:
             yield [own_id, mission.requirement_texts.get(own_id, ""), row.id, "", *map(_or_empty, result)]

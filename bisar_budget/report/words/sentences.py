@@ -95,7 +95,7 @@ def measure(row: Row, mission: MissionFindings) -> str:
         declared = row_size(row.declared, row, mission)
         declared = f"noise {declared}" if declared == AS_DECLARED else f"noise {declared} on the declared one"
     else:
-        declared = f"declared {row_size(row.declared, row, mission)}"
+        declared = f"declared {declared_size(row, mission)}"
     if row.allowable is None:
         return declared
     text = f"{declared}, allowable {row_limit(row, mission)}"
@@ -188,6 +188,12 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
     if not unit and row.unit == "rad" and kind.is_phase:
         unit = phase_unit(mission)
     return format_in(_level(value, row.unit), row.unit, unit, 3, rounding)
+
+
+def declared_size(row: Row, mission: MissionFindings) -> str:
+    """Write the declared size of a row, and its bias with its sign if it has one: `5 mm/s, bias -2 mm/s`."""
+    declared = row_size(row.declared, row, mission)
+    return declared if row.bias is None else f"{declared}, bias {row_size(row.bias, row, mission)}"
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
