@@ -23,7 +23,7 @@ from bisar_budget.effects.air_delays import (
     legs_of,
     metres_per_unit,
 )
-from bisar_budget.effects.declared import CUBIC, LOCATION
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
     arm_at,
@@ -63,6 +63,7 @@ from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
+from bisar_budget.report.explain.explained_confidence import quantile_step
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
 from bisar_budget.report.explain.explained_navigation import navigation_steps
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
@@ -728,8 +729,9 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     if row.reason is not None and row.reason.code == "wideband-has-no-spectrum":
         yield step("Allowable: not known", row.reason)
         return
-    effect = error.effect(model)
-    limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
+    effect, confidence_of = error.effect(model), mission.requirements.confidence_of
+    judged = error.judged_effect(model, confidence_of, allocation.autofocus_gain)
+    limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain, judged)
     limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an error stated by its effect on the image has no quadratic phase
         yield from limit_steps(allocation, error.owner, limit)
@@ -741,19 +743,28 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         values = {"limit": allowed, part: per_unit}
         return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
 
-    part = "QPE/unit"
+    part, rms_phase = "QPE/unit", float(effect.judged(allocation.autofocus_gain))
     if effect.hidden:
         part, gain = "judged/unit", allocation.autofocus_gain
         values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
         worked = WorkedEquation(
-            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, limited.quadratic, f"rad per {_unit(error)}"
+            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad per {_unit(error)}"
         )
         yield step("With the hidden phase, which autofocus does not correct", worked)
     if limited.quadratic:
+        if (confidence := error.is_covered and confidence_of(QUADRATIC)) and rms_phase:
+            unit = f"rad per {_unit(error)}"
+            yield quantile_step("quantile/unit", part, rms_phase, float(limited.quadratic), unit, confidence)
+            part = "quantile/unit"
         yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
-        yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)
+        part = "cubic/unit"
+        if confidence := error.is_covered and confidence_of(CUBIC):
+            unit = f"rad per {_unit(error)}"
+            yield quantile_step("quantile/unit", part, float(effect.cubic), float(judged.cubic), unit, confidence)
+            part = "quantile/unit"
+        yield by("by_cubic", part, required.cubic_phase_error, float(judged.cubic), title)
     if limited.spread and required.islr is not None:
         spread = "left/unit"
         if limited.spread != effect.spread:
@@ -773,7 +784,11 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
-        yield by("by_location", "moved/unit", required.location_error, float(effect.displacement), title)
+        part, rms_move, moved = "moved/unit", float(effect.displacement), float(judged.displacement)
+        if confidence := error.is_covered and confidence_of(LOCATION):
+            yield quantile_step("quantile/unit", part, rms_move, moved, f"m per {_unit(error)}", confidence)
+            part = "quantile/unit"
+        yield by("by_location", part, required.location_error, moved, title)
     yield from smallest_size(row, sizes)
 
 
