@@ -164,7 +164,7 @@ class RandomRows:
         return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
     def _sizes(self, model: str, effects: RandomEffect, judged_effects: RandomEffect) -> Floats:
-        """Compute the size at which each error reaches the limit of each requirement, (requirements, errors, cases).
+        """Compute the size at which each error reaches each limit, (requirements, errors, cases).
 
         The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect. The effects
         are those of one unit, at one sigma and at the quantiles of the requirements.
@@ -711,7 +711,7 @@ REASONS_FOR_NO_EFFECT: Mapping[str, Callable[[Mission, RandomError], Note]] = {
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
     gain, size = allocation.autofocus_gain, error.declared
-    effect = judged_effect_of(mission, error, model, gain)
+    effect = judged_effect_of(mission, error, model, gain)._replace(covariance=None).of(0)
     limits = limits_for(mission, allocation, error.owner, model, gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
@@ -721,7 +721,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.note("spreads-too-much", level_db=level(effect.spread * size), limit_db=level(limits.spread))
-    unit_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)
+    unit_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)._replace(covariance=None).of(0)
     qpe, hidden = unit_effect.quadratic * size, unit_effect.hidden * size
     over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
     return over.then(allocation.passes_with(qpe, hidden, error.owner, mission))
@@ -752,7 +752,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
     `gating` is the model that judges the error, `published` or `full`.
     """
     other_model, size = OTHER_MODEL[gating], error.declared
-    effect = judged_effect_of(mission, error, other_model, autofocus_gain_of(mission))
+    effect = judged_effect_of(mission, error, other_model, autofocus_gain_of(mission))._replace(covariance=None).of(0)
     if binding == ISLR:
         return phrases.note(
             "other-model-spreads", model=other_model, level_db=_levels(mission, other_model)(effect.spread * size)

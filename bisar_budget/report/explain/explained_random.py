@@ -283,7 +283,7 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
         title if error.is_covered else "In any direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
         WorkedEquation(
-            "moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, float(effect.displacement), unit
+            "moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, plain(effect.displacement), unit
         ),
     )
 
@@ -730,7 +730,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable: not known", row.reason)
         return
     effect, confidence_of = error.effect(model), mission.requirements.confidence_of
-    judged = error.judged_effect(model, confidence_of, allocation.autofocus_gain)
+    judged = error.judged_effect(model, confidence_of, allocation.autofocus_gain)._replace(covariance=None).of(0)
     limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain, judged)
     limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an error stated by its effect on the image has no quadratic phase
@@ -743,28 +743,28 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         values = {"limit": allowed, part: per_unit}
         return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
 
-    part, rms_phase = "QPE/unit", float(effect.judged(allocation.autofocus_gain))
+    part, rms_phase = "QPE/unit", plain(effect.judged(allocation.autofocus_gain))
     if effect.hidden:
         part, gain = "judged/unit", allocation.autofocus_gain
         values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
         worked = WorkedEquation(
-            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad per {_unit(error)}"
+            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad{_per(error)}"
         )
         yield step("With the hidden phase, which autofocus does not correct", worked)
     if limited.quadratic:
         if (confidence := error.is_covered and confidence_of(QUADRATIC)) and rms_phase:
-            unit = f"rad per {_unit(error)}"
-            yield quantile_step("quantile/unit", part, rms_phase, float(limited.quadratic), unit, confidence)
+            unit = f"rad{_per(error)}"
+            yield quantile_step("quantile/unit", part, rms_phase, plain(limited.quadratic), unit, confidence)
             part = "quantile/unit"
         yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
         part = "cubic/unit"
         if confidence := error.is_covered and confidence_of(CUBIC):
-            unit = f"rad per {_unit(error)}"
-            yield quantile_step("quantile/unit", part, float(effect.cubic), float(judged.cubic), unit, confidence)
+            unit = f"rad{_per(error)}"
+            yield quantile_step("quantile/unit", part, plain(effect.cubic), plain(judged.cubic), unit, confidence)
             part = "quantile/unit"
-        yield by("by_cubic", part, required.cubic_phase_error, float(judged.cubic), title)
+        yield by("by_cubic", part, required.cubic_phase_error, plain(judged.cubic), title)
     if limited.spread and required.islr is not None:
         spread = "left/unit"
         if limited.spread != effect.spread:
@@ -784,9 +784,9 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
-        part, rms_move, moved = "moved/unit", float(effect.displacement), float(judged.displacement)
+        part, rms_move, moved = "moved/unit", plain(effect.displacement), plain(judged.displacement)
         if confidence := error.is_covered and confidence_of(LOCATION):
-            yield quantile_step("quantile/unit", part, rms_move, moved, f"m per {_unit(error)}", confidence)
+            yield quantile_step("quantile/unit", part, rms_move, moved, f"m{_per(error)}", confidence)
             part = "quantile/unit"
         yield by("by_location", part, required.location_error, moved, title)
     yield from smallest_size(row, sizes)
@@ -811,3 +811,8 @@ def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limi
 
 def _unit(error: RandomError) -> str:
     return "" if error.unit == "dB" else error.unit
+
+
+def _per(error: RandomError) -> str:
+    """End of the unit of an effect of one unit of an error; empty for a level in dB."""
+    return f" per {error.unit}" if _unit(error) else ""
