@@ -35,7 +35,6 @@ from bisar_budget.report.compliance.rows import (
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.words.confidence import (
     PERCENTILES,
-    confidence_asked,
     has_percentiles,
     percentile_lines,
     percentile_words,
@@ -61,6 +60,7 @@ from bisar_budget.report.words.requirements import (
     verdict,
 )
 from bisar_budget.report.words.sentences import (
+    confidence_asked,
     counted,
     dashed,
     measure,

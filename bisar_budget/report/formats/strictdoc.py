@@ -16,10 +16,9 @@ from bisar_budget.findings.status import worst
 from bisar_budget.report import Style
 from bisar_budget.report.formats.requirement_list import limit_of_file
 from bisar_budget.report.formats.traceability import identifier, origin
-from bisar_budget.report.words.confidence import confidence_asked
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import finding, row_limit
+from bisar_budget.report.words.sentences import confidence_asked, finding, row_limit
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,9 @@ from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.report.words.sentences import requirement_limit, requirement_size
+from bisar_budget.report.words.sentences import confidence_asked, requirement_limit, requirement_size
 
 PERCENTILES = ("50", "68", "90", "95", "99.7")  # in percent, keys of the percentiles of a requirement
-
-
-def confidence_asked(requirement: JudgedRequirement) -> str:
-    """Confidence with which the file asks for a limit, such as `95 %`; empty without one."""
-    return "" if requirement.confidence is None else f"{100 * requirement.confidence:.8g} %"
 
 
 def with_confidence(limit: str, requirement: JudgedRequirement | None) -> str:

@@ -98,10 +98,20 @@ def measure(row: Row, mission: MissionFindings) -> str:
         declared = f"declared {declared_size(row, mission)}"
     if row.allowable is None:
         return declared
-    text = f"{declared}, allowable {row_limit(row, mission)}"
+    text = f"{declared}, allowable {row_limit(row, mission)}{_confidence_of(row, mission)}"
     if binding := binding_words(row):
         text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
+
+
+def _confidence_of(row: Row, mission: MissionFindings) -> str:
+    """Confidence of the requirement that sets the allowable of a row, in brackets with a leading space.
+
+    The text is empty if the requirement has no confidence.
+    """
+    key = row.metric if row.binding_requirement is None else row.binding_requirement
+    asked = {requirement.key: confidence_asked(requirement) for requirement in mission.requirements}.get(key, "")
+    return f" ({asked})" if asked else ""
 
 
 def cause(row: Row) -> str:
@@ -233,6 +243,11 @@ def phase_unit(mission: MissionFindings) -> str:
 def phase_limit(value: float, mission: MissionFindings) -> str:
     """Write an allowed phase [rad] in the unit of the quadratic phase requirement, rounded down."""
     return format_in(value, "rad", phase_unit(mission), 3, "down")
+
+
+def confidence_asked(requirement: JudgedRequirement) -> str:
+    """Confidence with which the file asks for a limit, such as `95 %`; empty without one."""
+    return "" if requirement.confidence is None else f"{100 * requirement.confidence:.8g} %"
 
 
 def requirement_limit(value: float | None, requirement: JudgedRequirement) -> str:
