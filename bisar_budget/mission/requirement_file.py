@@ -25,13 +25,24 @@ from bisar_budget.faults import (
 )
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Requirements, id_of_requirement
-from bisar_budget.mission.readers import INVALID, Reader, Section, Statement, Text, did_you_mean
+from bisar_budget.mission.readers import (
+    CONFIDENCE,
+    CONFIDENCE_FIELD,
+    INVALID,
+    LIMIT_FIELD,
+    Reader,
+    Section,
+    Statement,
+    Text,
+    WithConfidence,
+    did_you_mean,
+)
 from bisar_budget.mission.tree import MAX_BYTES, Tree
 from bisar_budget.paths.flight import PathFileError
 
 COLUMNS = ("id", "text", "key", "limit")
 FILE_KEY: KeyPath = ("requirements", "file")
-_CONFIDENCE = "confidence"  # column for a confidence level of each limit, which the tool does not have yet
+_CONFIDENCE = "confidence"  # optional column: the probability with which the limit of the line is kept
 _LIMITS: dict[str, Reader[object]] = {
     key: entry.reader for key, entry in Section(Requirements).keys.items() if key != FILE_KEY[-1]
 }
@@ -60,6 +71,7 @@ class RequirementEntry(NamedTuple):
     text: Cell
     key: Cell
     limit: Cell
+    confidence: Cell
 
 
 # ---------------------------------------------------------------------- CSV
@@ -175,17 +187,15 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
         accepted = "accepted: a cell that begins and ends with one, with doubled marks inside"
         faults.at(unclosed[0], "", "begins with a quotation mark that the cell does not close", accepted)
     by_name = {name: cells[index] if index < len(cells) else behind for name, index in columns.items()}
-    line = RequirementEntry(*(_without_apostrophe(by_name[name]) for name in COLUMNS))
+    cells_of_line = [by_name[name] for name in COLUMNS] + [by_name.get(_CONFIDENCE, behind._replace(text=""))]
+    line = RequirementEntry(*map(_without_apostrophe, cells_of_line))
     if not any(cell.text for cell in line):
         return None  # only columns that are not used have text
     key = line.key.text.removeprefix("requirements.").removeprefix("requirement.")
     key = key if key in _LIMITS else line.key.text
     line = line._replace(key=line.key._replace(text=key))
-    if confidence := by_name.get(_CONFIDENCE, behind).text:
-        problem = "a confidence for each limit is not there yet"
-        faults.at(
-            by_name[_CONFIDENCE], _CONFIDENCE, problem, "accepted: an empty cell, or no such column", "", confidence
-        )
+    if line.confidence.text:
+        _check_confidence(line, faults)
     for cell, name, reader in ((line.id, "id", Text()), (line.text, "text", Statement())):
         if cell.text:
             reader.read(cell.text, (), faults.of(cell, name))
@@ -202,10 +212,21 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
             "accepted: an empty cell",
         )
     elif line.limit.text:
-        _LIMITS[key].read(_written(line), (), faults.of(line.limit, "limit"))
+        _LIMITS[key].read(_written(line, has_confidence=False), (), faults.of(line.limit, "limit"))
     if not line.id.text and (key not in _LIMITS or line.text.text or not line.limit.text):
         faults.at(line.id, "id", "is missing", "accepted: the id of a requirement of the project")
     return line if len(faults.faults) == count else None
+
+
+def _check_confidence(line: RequirementEntry, faults: _Faults) -> None:
+    """Record a fault if a line states a confidence that is no probability, or that its requirement cannot have."""
+    if not isinstance(_LIMITS.get(line.key.text), WithConfidence):
+        problem = f"{printable(line.key.text)} has no confidence"
+        faults.at(line.confidence, _CONFIDENCE, problem, "accepted: an empty cell")
+    elif not line.limit.text:
+        faults.at(line.confidence, _CONFIDENCE, "states no limit", "accepted: a limit in the same line")
+    else:
+        CONFIDENCE.read(line.confidence.text, (), faults.of(line.confidence, _CONFIDENCE))
 
 
 def _without_apostrophe(cell: Cell) -> Cell:
@@ -213,8 +234,13 @@ def _without_apostrophe(cell: Cell) -> Cell:
     return cell._replace(text=cell.text[1:]) if re.match("'[-+=@]", cell.text) else cell
 
 
-def _written(line: RequirementEntry) -> str | list[str]:
-    """Limit of a line as a mission file would state it: a string, or a list of strings for the key `declare`."""
+def _written(line: RequirementEntry, *, has_confidence: bool = True) -> str | list[str] | dict[str, str]:
+    """Limit of a line as a mission file would state it: a string, or a list of strings for the key `declare`.
+
+    If the line has a confidence, the limit and the confidence are in a mapping, unless `has_confidence` is false.
+    """
+    if line.confidence.text and has_confidence:
+        return {LIMIT_FIELD: line.limit.text, CONFIDENCE_FIELD: line.confidence.text}
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text
@@ -312,6 +338,9 @@ class _Into:
         section[key] = _written(line)
         self.added.add(path)
         self._put(path, line.limit.text)
+        if line.confidence.text:
+            self._put((*path, LIMIT_FIELD), line.limit.text)
+            self._put((*path, CONFIDENCE_FIELD), line.confidence.text)
 
     def _id(self, row_id: str, own_id: str) -> None:
         section, path = self._section("requirement_ids"), ("requirement_ids", row_id)

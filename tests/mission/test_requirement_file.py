@@ -233,13 +233,25 @@ class TestFaults:
         )
 
     @pytest.mark.parametrize("level", ["95 %", "0.95"])
-    def test_a_confidence_is_refused(self, stated, level) -> None:
-        (fault,) = faults(stated(f"id,text,key,limit,confidence\nA,,location_error,5 m,{level}\n"))
-        assert fault == (
-            "requirements.file: reqs.csv:2:23: confidence: a confidence for each limit is not there yet "
-            f"(got {level}); accepted: an empty cell, or no such column"
-        )
-        load_mission(str(stated("id,text,key,limit,confidence\nA,,location_error,5 m,\n")))
+    def test_a_confidence(self, stated, level) -> None:
+        mission = load_mission(str(stated(f"id,text,key,limit,confidence\nA,,location_error,5 m,{level}\n")))
+        assert mission.requirements.location_error == 5.0
+        assert mission.requirements.confidence_of("location_error") == 0.95
+        mission = load_mission(str(stated("id,text,key,limit,confidence\nA,,location_error,5 m,\n")))
+        assert mission.requirements.confidence_of("location_error") is None
+
+    @pytest.mark.parametrize(
+        ("line", "fault"),
+        [
+            ("A,,location_error,5 m,95", "2:23: confidence: must be a probability from 50 % to 99.9999 % (got 95)"),
+            ("A,,islr,-20 dB,95 %", "2:16: confidence: islr has no confidence (got 95 %); accepted: an empty cell"),
+            ("A,,receiver.velocity.x,,95 %", "2:25: confidence: receiver.velocity.x has no confidence"),
+            ("A,,location_error,,95 %", "2:20: confidence: states no limit (got 95 %)"),
+        ],
+    )
+    def test_a_wrong_confidence(self, stated, line, fault) -> None:
+        first, *_ = faults(stated(f"id,text,key,limit,confidence\n{line}\n"))
+        assert first.startswith(f"requirements.file: reqs.csv:{fault}")
 
     @pytest.mark.parametrize(
         ("csv", "fault"),
@@ -312,4 +324,5 @@ def test_lines_are_read_with_their_places() -> None:
         ("x", 2, 5),
         ("islr", 2, 7),
         ("-3 dB", 2, 13),
+        ("", 2, 18),  # no column confidence
     ]

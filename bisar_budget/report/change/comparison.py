@@ -182,12 +182,18 @@ def loosened_settings(before: Mapping[str, object], after: Mapping[str, object])
 
 
 def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Yield the requirements that were removed or now have a larger value."""
+    """Yield the requirements that were removed or now have a larger value, and confidences that are now lower."""
     for key in Requirements._fields:
+        if key in ("declare", "file", "confidence"):
+            continue
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
-        if key not in ("declare", "file") and old is not None and (new is None or _is_above(new, old)):
+        if old is not None and (new is None or _is_above(new, old)):
             path = ("requirements", key)
             yield Loosened(dotted(path), _value_text(before, path, old), _value_text(after, path, new))
+        old, new = (mission.requirements.confidence_of(key) for mission in (before, after))
+        if old is not None and (new is None or _is_above(old, new)):
+            texts = ("none" if confidence is None else f"{100 * confidence:.8g} %" for confidence in (old, new))
+            yield Loosened(f"requirements.{key}.confidence", *texts)
 
 
 def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened]:
@@ -389,7 +395,7 @@ def _value_text(mission: Mission, path: tuple[str, ...], value: float | None) ->
     if value is None:
         return "none"
     default = f"{math.degrees(value):g} deg" if path[-1] == "quadratic_phase_error" else f"{value:g}"
-    return texts_of_file(mission).get(path, f"{default} (default)")
+    return texts_of_file(mission).get(mission.written_path(path), f"{default} (default)")
 
 
 # ---------------------------------------------------------------------- results
