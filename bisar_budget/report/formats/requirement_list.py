@@ -1,8 +1,8 @@
 """Write the requirements of missions with their status as CSV.
 
 The first columns, and the last one, are the same as in a requirements file. A line contains a requirement id of the
-project and the requirement or row to which the id is assigned. A requirement without such an id has a line of its own.
-A mission can read the CSV file with `requirements: {file: …}`; the columns from `status` to `overrides` are ignored.
+project and the requirement or row to which the id is assigned. A requirement without such an id has its own line. A
+mission can read the CSV file with `requirements: {file: …}`; the columns from `status` to `overrides` are ignored.
 """
 
 import math
