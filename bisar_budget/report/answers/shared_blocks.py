@@ -8,8 +8,8 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
-from bisar_budget.report.words.confidence import PERCENTILES, percentile_lines, percentile_words
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
+from bisar_budget.report.words.percentiles import PERCENTILES, percentile_lines, percentile_words
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import own_id
 

@@ -17,8 +17,8 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
-from bisar_budget.report.words.confidence import with_confidence
 from bisar_budget.report.words.identity import source_path
+from bisar_budget.report.words.percentiles import with_confidence
 from bisar_budget.report.words.sentences import (
     allowable_words,
     dashed,

@@ -33,12 +33,6 @@ from bisar_budget.report.compliance.rows import (
     verification_words,
 )
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
-from bisar_budget.report.words.confidence import (
-    PERCENTILES,
-    has_percentiles,
-    percentile_lines,
-    percentile_words,
-)
 from bisar_budget.report.words.heading import (
     document_words,
     doubtful_model,
@@ -49,6 +43,12 @@ from bisar_budget.report.words.heading import (
     rule_words,
 )
 from bisar_budget.report.words.identity import source_path
+from bisar_budget.report.words.percentiles import (
+    PERCENTILES,
+    has_percentiles,
+    percentile_lines,
+    percentile_words,
+)
 from bisar_budget.report.words.requirements import (
     confidence_words,
     kind_names,

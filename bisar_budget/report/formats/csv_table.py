@@ -20,8 +20,8 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Piece, Style
-from bisar_budget.report.words.confidence import PERCENTILE_COLUMNS, percentile_columns
 from bisar_budget.report.words.heading import overrides_words
+from bisar_budget.report.words.percentiles import PERCENTILE_COLUMNS, percentile_columns
 from bisar_budget.report.words.requirements import requirement_id, share_columns, use_remarks
 from bisar_budget.report.words.sentences import spreadsheet_text
 

@@ -12,7 +12,7 @@ from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import Note
-from bisar_budget.report.words.confidence import limit_asked
+from bisar_budget.report.words.percentiles import limit_asked
 from bisar_budget.report.words.sentences import (
     counted,
     own_id,

@@ -13,7 +13,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.report.answers.check_answer import brief
 from bisar_budget.report.renderers import html
-from bisar_budget.report.words.confidence import percentile_columns, percentile_lines
+from bisar_budget.report.words.percentiles import percentile_columns, percentile_lines
 from bisar_budget.report.words.requirements import requirement_finding, verdict
 from tests.conftest import TODAY, mission_text
 from tests.report.test_report_explanation import BIASED, SURE
