@@ -9,7 +9,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
-from bisar_budget.report.words.percentiles import PERCENTILES, percentile_lines, percentile_words
+from bisar_budget.report.words.percentiles import PERCENTILE_KEYS, percentile_lines, percentile_words
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import own_id
 
@@ -76,7 +76,7 @@ def percentile_blocks(findings: MissionFindings) -> Iterator[doc.Block]:
     lines = list(percentile_lines(findings))
     if not lines:
         return
-    heads = doc.heads("not exceeded in", *doc.numbers(*(f"{name} %" for name in PERCENTILES)))
+    heads = doc.heads("not exceeded in", *doc.numbers(*(f"{name} %" for name in PERCENTILE_KEYS)))
     rows = [[line.name, *line.sizes] for line in lines]
     table = doc.TextTable("Percentiles", "Percentiles of the limited quantities", heads, rows)
     yield doc.Close([table, doc.Items([[percentile_words(findings)]])])

@@ -44,7 +44,7 @@ from bisar_budget.report.words.heading import (
 )
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.percentiles import (
-    PERCENTILES,
+    PERCENTILE_KEYS,
     has_percentiles,
     percentile_lines,
     percentile_words,
@@ -371,7 +371,7 @@ def _how_sure(page: Page) -> Iterator[doc.Block]:
         )
         lines.append((sentence(line.name.strip()), *line.sizes, *limit))
     if lines:
-        sizes = (*(f"{name} %" for name in PERCENTILES), "Limit", "Confidence asked", "Collections within it")
+        sizes = (*(f"{name} %" for name in PERCENTILE_KEYS), "Limit", "Confidence asked", "Collections within it")
         words = percentile_words(page.findings).removesuffix(".")
         caption = f"How sure: {words[:1].lower()}{words[1:]}"
         columns = doc.heads("Quantity", *doc.numbers(*sizes))

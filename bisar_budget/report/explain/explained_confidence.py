@@ -166,14 +166,14 @@ def biased_use(analysis: Analysis, source: ErrorSource, row: Row) -> Step:
     return step("Utilization, the largest judged size / size at the limit", line)
 
 
-def quantile_step(name: str, part: str, rms: float, quantile: float, unit: str, confidence: float) -> Step:
+def quantile_step(name: str, rms_name: str, rms: float, quantile: float, unit: str, confidence: float) -> Step:
     """Step from the rms effect of a random error to the effect that it does not exceed with a confidence.
 
     The ratio of the two depends on the proportions of the independent parts of the effect.
     """
     title = f"{confidence_percent(confidence)} quantile of the length of this normal effect, over its rms length"
-    values = {"ratio": quantile / rms, part: rms}
-    return step(title, WorkedEquation(name, f"ratio*({part})", values, quantile, unit))
+    values = {"ratio": quantile / rms, rms_name: rms}
+    return step(title, WorkedEquation(name, f"ratio*({rms_name})", values, quantile, unit))
 
 
 def total_steps(
@@ -213,5 +213,5 @@ def total_steps(
 
 
 def _bias_line(mean: Floats, bias: float, unit: str) -> str:
-    terms = " + ".join(f"{number(float(part))}^2" for part in mean if part) or "0"
+    terms = " + ".join(f"{number(float(effect))}^2" for effect in mean if effect) or "0"
     return Sum(f"bias = sqrt({terms}) = {with_unit(bias, unit)}")

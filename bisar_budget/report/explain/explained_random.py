@@ -738,33 +738,33 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     sizes: dict[str, float] = {}
     required = mission.requirements
 
-    def by(name: str, part: str, allowed: float, per_unit: float, title: str) -> Step:
+    def by(name: str, symbol: str, allowed: float, per_unit: float, title: str) -> Step:
         sizes[name] = allowed / per_unit
-        values = {"limit": allowed, part: per_unit}
-        return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
+        values = {"limit": allowed, symbol: per_unit}
+        return step(title, WorkedEquation(name, f"limit/({symbol})", values, sizes[name], _unit(error)))
 
-    part, rms_phase = "QPE/unit", plain(effect.judged(allocation.autofocus_gain))
+    symbol, rms_phase = "QPE/unit", plain(effect.judged(allocation.autofocus_gain))
     if effect.hidden:
-        part, gain = "judged/unit", allocation.autofocus_gain
+        symbol, gain = "judged/unit", allocation.autofocus_gain
         values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
         worked = WorkedEquation(
-            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad{_per(error)}"
+            symbol, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad{_per(error)}"
         )
         yield step("With the hidden phase, which autofocus does not correct", worked)
     if limited.quadratic:
         if (confidence := error.is_covered and confidence_of(QUADRATIC)) and rms_phase:
             unit = f"rad{_per(error)}"
-            yield quantile_step("quantile/unit", part, rms_phase, plain(limited.quadratic), unit, confidence)
-            part = "quantile/unit"
-        yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
+            yield quantile_step("quantile/unit", symbol, rms_phase, plain(limited.quadratic), unit, confidence)
+            symbol = "quantile/unit"
+        yield by("by_QPE", symbol, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
-        part = "cubic/unit"
+        symbol = "cubic/unit"
         if confidence := error.is_covered and confidence_of(CUBIC):
             unit = f"rad{_per(error)}"
-            yield quantile_step("quantile/unit", part, plain(effect.cubic), plain(judged.cubic), unit, confidence)
-            part = "quantile/unit"
-        yield by("by_cubic", part, required.cubic_phase_error, plain(judged.cubic), title)
+            yield quantile_step("quantile/unit", symbol, plain(effect.cubic), plain(judged.cubic), unit, confidence)
+            symbol = "quantile/unit"
+        yield by("by_cubic", symbol, required.cubic_phase_error, plain(judged.cubic), title)
     if limited.spread and required.islr is not None:
         spread = "left/unit"
         if limited.spread != effect.spread:
@@ -784,11 +784,11 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
-        part, rms_move, moved = "moved/unit", plain(effect.displacement), plain(judged.displacement)
+        symbol, rms_move, moved = "moved/unit", plain(effect.displacement), plain(judged.displacement)
         if confidence := error.is_covered and confidence_of(LOCATION):
-            yield quantile_step("quantile/unit", part, rms_move, moved, f"m{_per(error)}", confidence)
-            part = "quantile/unit"
-        yield by("by_location", part, required.location_error, moved, title)
+            yield quantile_step("quantile/unit", symbol, rms_move, moved, f"m{_per(error)}", confidence)
+            symbol = "quantile/unit"
+        yield by("by_location", symbol, required.location_error, moved, title)
     yield from smallest_size(row, sizes)
 
 

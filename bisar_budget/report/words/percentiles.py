@@ -7,7 +7,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.report.words.sentences import confidence_asked, requirement_limit, requirement_size
 
-PERCENTILES = ("50", "68", "90", "95", "99.7")  # in percent, keys of the percentiles of a requirement
+PERCENTILE_KEYS = ("50", "68", "90", "95", "99.7")  # in percent, keys of the percentiles of a requirement
 
 
 def with_confidence(limit: str, requirement: JudgedRequirement | None) -> str:
@@ -24,7 +24,7 @@ def limit_asked(requirement: JudgedRequirement) -> str:
 class PercentileLine(NamedTuple):
     """One line of the table of percentiles.
 
-    `sizes` are the sizes that the quantity `name` does not exceed with the probabilities of `PERCENTILES`, as text.
+    `sizes` are the sizes that the quantity `name` does not exceed with the probabilities of `PERCENTILE_KEYS`, as text.
     `is_limited` tells whether the requirement limits this quantity, and not only one component of it.
     """
 
@@ -40,8 +40,8 @@ def percentile_lines(mission: MissionFindings) -> Iterator[PercentileLine]:
     The lines of a location error are the length of the displacement, and its components along range and azimuth.
     """
     for requirement in mission.requirements:
-        is_place = requirement.percentiles_range is not None
-        name = f"{requirement.name} (circle)" if is_place else requirement.name
+        is_location = requirement.percentiles_range is not None
+        name = f"{requirement.name} (circle)" if is_location else requirement.name
         columns = (
             (name, requirement.percentiles),
             ("  along range", requirement.percentiles_range),
@@ -53,7 +53,7 @@ def percentile_lines(mission: MissionFindings) -> Iterator[PercentileLine]:
 
 
 def _sizes(percentiles: Mapping[str, float], requirement: JudgedRequirement) -> tuple[str, ...]:
-    return tuple(requirement_size(percentiles[name], requirement) for name in PERCENTILES)
+    return tuple(requirement_size(percentiles[name], requirement) for name in PERCENTILE_KEYS)
 
 
 def has_percentiles(mission: MissionFindings) -> bool:
@@ -65,7 +65,7 @@ def percentile_words(mission: MissionFindings) -> str:
     """Sentence that explains the percentiles of a mission."""
     text = "Sizes that the effect of all declared errors, drawn together, does not exceed"
     if any(requirement.percentiles_range is not None for requirement in mission.requirements):
-        text += f"; for the circle they are CE{PERCENTILES[0]} to CE{PERCENTILES[-1]}"
+        text += f"; for the circle they are CE{PERCENTILE_KEYS[0]} to CE{PERCENTILE_KEYS[-1]}"
     return f"{text}."
 
 
@@ -73,7 +73,7 @@ _PERCENTILE_PREFIXES = ("percentile", "percentile_range", "percentile_azimuth")
 PERCENTILE_COLUMNS = (
     "confidence_required",
     "probability",
-    *(f"{prefix}_{name}" for prefix in _PERCENTILE_PREFIXES for name in PERCENTILES),
+    *(f"{prefix}_{name}" for prefix in _PERCENTILE_PREFIXES for name in PERCENTILE_KEYS),
 )
 
 
@@ -84,6 +84,8 @@ def percentile_columns(requirement: JudgedRequirement) -> dict[str, float | None
     """
     of_quantities = (requirement.percentiles, requirement.percentiles_range, requirement.percentiles_azimuth)
     sizes = [
-        None if percentiles is None else percentiles[name] for percentiles in of_quantities for name in PERCENTILES
+        None if percentiles is None else percentiles[name]
+        for percentiles in of_quantities
+        for name in PERCENTILE_KEYS
     ]
     return dict(zip(PERCENTILE_COLUMNS, (requirement.confidence, requirement.probability, *sizes), strict=True))
