@@ -24,7 +24,7 @@ def limit_asked(requirement: JudgedRequirement) -> str:
 class PercentileLine(NamedTuple):
     """One line of the table of percentiles.
 
-    `sizes` are the sizes that the quantity `name` does not exceed with the probabilities of `PERCENTILE_KEYS`, as text.
+    `sizes` are the sizes that the quantity `name` does not exceed, one for each of `PERCENTILE_KEYS`.
     `is_limited` tells whether the requirement limits this quantity, and not only one component of it.
     """
 
