@@ -166,8 +166,8 @@ class RandomRows:
     def _sizes(self, model: str, effects: RandomEffect, judged_effects: RandomEffect) -> Floats:
         """Compute the size at which each error reaches each limit, (requirements, errors, cases).
 
-        The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect. The effects
-        are those of one unit, at one sigma and at the quantiles of the requirements.
+        The sizes are in the unit of the error. A size is infinite if there is no requirement or no effect. The
+        effects are those of one unit, at one sigma and at the quantiles of the requirements.
         """
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
         by_owner = {
