@@ -208,6 +208,9 @@ class Totals:
         exact = self.errors.judged("full", stated).in_one_case(case)
         size = abs(plain(block.judged_sizes(requirement)[index], case))
         per_unit = plain(block.per_unit("full")[LIMITING_REQUIREMENTS.index(requirement), index], case)
+        if requirement == QUADRATIC:  # with this gain, not with that of the mission
+            hidden = plain(gain, case) * plain(block.hidden_per_unit[0, index], case)
+            per_unit = math.hypot(plain(block.effects["full"].qpe[index], case), hidden)
         moved = 0.0 if exact.farthest is None else math.hypot(*exact.farthest)
         effect = {QUADRATIC: exact.judged(plain(gain, case)), CUBIC: abs(exact.cubic), LOCATION: moved}[requirement]
         first_order = per_unit * size

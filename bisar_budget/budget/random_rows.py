@@ -744,7 +744,7 @@ REASONS_FOR_NO_EFFECT: Mapping[str, Callable[[Mission, RandomError], Note]] = {
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
     gain, size = allocation.autofocus_gain, error.declared
-    effect = judged_effect_of(mission, error, model, gain)
+    effect = judged_effect_of(mission, error, model, gain)._replace(covariance=None).of(0)
     limits = limits_for(mission, allocation, error.owner, model, gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
@@ -754,7 +754,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.note("spreads-too-much", level_db=level(effect.spread * size), limit_db=level(limits.spread))
-    unit_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)
+    unit_effect = error.judged_effect(model, mission.requirements.confidence_of, gain)._replace(covariance=None).of(0)
     qpe, hidden = unit_effect.quadratic * size, unit_effect.hidden * size
     over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
     return over.then(allocation.passes_with(qpe, hidden, error.owner, mission))
@@ -785,7 +785,7 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
     `gating` is the model that judges the error, `published` or `full`.
     """
     other_model, size = OTHER_MODEL[gating], error.declared
-    effect = judged_effect_of(mission, error, other_model, autofocus_gain_of(mission))
+    effect = judged_effect_of(mission, error, other_model, autofocus_gain_of(mission))._replace(covariance=None).of(0)
     if binding == ISLR:
         return phrases.note(
             "other-model-spreads", model=other_model, level_db=_levels(mission, other_model)(effect.spread * size)

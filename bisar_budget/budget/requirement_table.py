@@ -224,7 +224,8 @@ def _with_distribution(requirement: JudgedRequirement, judged: JudgedMission, ca
 
     It is the distribution by the gating model, of all declared errors together, whatever the mission's rule. The
     requirement is returned unchanged if no image forms with an error of the declared size, or if no error is
-    declared.
+    declared. The percentiles of a quadratic phase are those before autofocus, and its probability is that with
+    autofocus.
     """
     key, model, totals = requirement.key, next(iter(judged.families)), judged.totals
     together = judged.analysis.together(model)
@@ -234,9 +235,11 @@ def _with_distribution(requirement: JudgedRequirement, judged: JudgedMission, ca
     if not math.isfinite(case.number(of_all)):
         return requirement
     vector, limit = totals.of_all(model, key, case.place), getattr(case.mission.requirements, key)
-    requirement = requirement._replace(
-        percentiles=_percentiles(vector), probability=None if limit is None else vector.probability(limit)
-    )
+    requirement = requirement._replace(percentiles=_percentiles(vector))
+    if limit is not None:
+        gain = case.allocation.autofocus_gain if key == QUADRATIC else 1.0
+        with_gain = vector if gain == 1 else totals.vector(model, key, lambda owner: True, case.place, gain)
+        requirement = requirement._replace(probability=with_gain.probability(limit * gain))
     if key == LOCATION:
         east, north = (case.number(component) for component in case.geometry.range_gradient)
         along = np.array((east, north)) / math.hypot(east, north)

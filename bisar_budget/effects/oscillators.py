@@ -297,7 +297,7 @@ def states_both_terms(mission: Mission) -> bool:
     False.
     """
     timing = mission.timing_error
-    return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
+    return not mission.has_direct_path and None not in (timing.constant, timing.linear)
 
 
 def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:

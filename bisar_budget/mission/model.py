@@ -26,12 +26,14 @@ from bisar_budget.mission.readers import (
     DURATION,
     HEIGHT,
     LATITUDE,
+    LIMIT_FIELD,
     PHASE,
     PHASE_REQUIREMENT,
     RADAR_FREQUENCY,
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
+    SIZE_FIELD,
     UNCERTAINTY_TEXT,
     Choice,
     Day,
@@ -763,6 +765,20 @@ class Mission(NamedTuple):
         """
         return "full" if self.has_direct_path else self.allocation.model
 
+    def written_path(self, path: KeyPath) -> KeyPath:
+        """Path at which the file writes the number of a value.
+
+        It differs from `path` for a size beside a bias, and for a limit beside a confidence, such as
+        `requirements.location_error.limit`.
+        """
+        is_component = bool(path) and isinstance(path[-1], int)
+        parent, component = (path[:-1], path[-1:]) if is_component else (path, ())
+        for field in (SIZE_FIELD, LIMIT_FIELD):
+            for written in ((*parent, field, *component), (*parent, field)):
+                if written in self.places:
+                    return written
+        return path
+
     def line(self, path: KeyPath) -> Place | None:
         """Line number of a value in the mission file, starting at 1, and the region that the value occupies.
 
@@ -770,12 +786,12 @@ class Mission(NamedTuple):
         such section, to the first key of the file. The result is None for a mission without a file, and for a value
         that an option has set.
         """
-        event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
+        event = next(filter(None, map(self.places.get, (*upwards(self.written_path(path)), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
         """Whether an option has set the value at `path`, or a section or list that contains it."""
-        event = next(filter(None, map(self.places.get, upwards(path))), None)
+        event = next(filter(None, map(self.places.get, upwards(self.written_path(path)))), None)
         return bool(self.changes) and isinstance(event, Changed)
 
 

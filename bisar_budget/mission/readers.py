@@ -905,7 +905,8 @@ class _Pair(Section[SectionValue]):
         return {"$ref": f"#/definitions/{self.name}"}
 
 
-SIZE_FIELD, BIAS_FIELD, CONFIDENCE_FIELD = "sigma", "bias", "confidence"
+SIZE_FIELD, BIAS_FIELD = "sigma", "bias"
+LIMIT_FIELD, CONFIDENCE_FIELD = "limit", "confidence"
 
 
 class _SizeAndBias(_Pair):
@@ -992,10 +993,10 @@ class _LimitAndConfidence(_Pair):
 
     def __init__(self, limit: "Quantity", name: str, default: float | None) -> None:
         keys = {
-            "limit": Key(limit, "The limit."),
+            LIMIT_FIELD: Key(limit, "The limit."),
             CONFIDENCE_FIELD: Key(_PROBABILITY, "Probability with which the limit is kept, 50 % to 99.9999 %."),
         }
-        required = () if default is not None else ("limit",)
+        required = () if default is not None else (LIMIT_FIELD,)
         super().__init__(name, "A limit and the confidence with which it is kept.", keys, required)
         self.default = default
 
@@ -1010,7 +1011,7 @@ class _LimitAndConfidence(_Pair):
         confidence = pair.get(CONFIDENCE_FIELD)
         # As text it is a part of the form of a mission: cases with different confidences are not one array.
         text = None if confidence is None else repr(confidence)
-        return WithContent(pair.get("limit", self.default), CONFIDENCE_FIELD, text)
+        return WithContent(pair.get(LIMIT_FIELD, self.default), CONFIDENCE_FIELD, text)
 
 
 class WithConfidence(OneOf[SectionValue]):

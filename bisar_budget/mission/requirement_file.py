@@ -26,7 +26,9 @@ from bisar_budget.faults import (
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Requirements, id_of_requirement
 from bisar_budget.mission.readers import (
+    CONFIDENCE_FIELD,
     INVALID,
+    LIMIT_FIELD,
     Level,
     Reader,
     Section,
@@ -40,7 +42,6 @@ from bisar_budget.paths.flight import PathFileError
 
 COLUMNS = ("id", "text", "key", "limit")
 FILE_KEY: KeyPath = ("requirements", "file")
-_CONFIDENCE = "confidence"  # column that a file may have: the probability with which each limit is kept
 _LIMITS: dict[str, Reader[object]] = {
     key: entry.reader for key, entry in Section(Requirements).keys.items() if key != FILE_KEY[-1]
 }
@@ -158,7 +159,7 @@ def read_requirement_lines(data: bytes, file: str) -> tuple[RequirementEntry, ..
 def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
     """Indices of the known columns and of a column `confidence`, by name; all other columns are ignored."""
     names = [cell.text.lower() for cell in header]
-    for name in (*COLUMNS, _CONFIDENCE):
+    for name in (*COLUMNS, CONFIDENCE_FIELD):
         if names.count(name) > 1:
             second = header[names.index(name, names.index(name) + 1)]
             faults.at(second, "", f"the column {name} is there twice")
@@ -167,7 +168,7 @@ def _columns_of(header: Sequence[Cell], faults: _Faults) -> dict[str, int]:
         near = did_you_mean(missing[0], tuple(name for name in names if name not in COLUMNS))
         names_words = shown(", ".join(cell.text for cell in header))
         faults.at(header[0], "", f"lacks the column {', '.join(missing)}", _ACCEPTED_HEADER, near, names_words)
-    return {name: names.index(name) for name in (*COLUMNS, _CONFIDENCE) if name in names}
+    return {name: names.index(name) for name in (*COLUMNS, CONFIDENCE_FIELD) if name in names}
 
 
 def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults: _Faults) -> RequirementEntry | None:
@@ -185,7 +186,9 @@ def _line_of(cells: Sequence[Cell], columns: dict[str, int], width: int, faults:
         accepted = "accepted: a cell that begins and ends with one, with doubled marks inside"
         faults.at(unclosed[0], "", "begins with a quotation mark that the cell does not close", accepted)
     by_name = {name: cells[index] if index < len(cells) else behind for name, index in columns.items()}
-    line = RequirementEntry(*(_without_apostrophe(by_name.get(name, behind)) for name in (*COLUMNS, _CONFIDENCE)))
+    line = RequirementEntry(
+        *(_without_apostrophe(by_name.get(name, behind)) for name in (*COLUMNS, CONFIDENCE_FIELD))
+    )
     if not any(cell.text for cell in line):
         return None  # only columns that are not used have text
     key = line.key.text.removeprefix("requirements.").removeprefix("requirement.")
@@ -218,15 +221,15 @@ def _report_limit(line: RequirementEntry, faults: _Faults) -> None:
     key = line.key.text
     if not line.confidence.text:
         _LIMITS[key].read(_written(line), (), faults.of(line.limit, "limit"))
-    elif not isinstance(_LIMITS[key], WithConfidence):
-        level = "is an expectation over all errors, and " if isinstance(_LIMITS[key], Level) else ""
+    elif not isinstance(_LIMITS.get(key), WithConfidence):
+        level = "is an expectation over all errors, and " if isinstance(_LIMITS.get(key), Level) else ""
         problem = f"{printable(key)} {level}has no confidence"
-        faults.at(line.confidence, _CONFIDENCE, problem, "accepted: an empty cell")
+        faults.at(line.confidence, CONFIDENCE_FIELD, problem, "accepted: an empty cell")
     else:
 
         def report(path: KeyPath, problem: Problem) -> None:
-            is_confidence = path[-1:] == (_CONFIDENCE,)
-            cell, column = (line.confidence, _CONFIDENCE) if is_confidence else (line.limit, "limit")
+            is_confidence = path[-1:] == (CONFIDENCE_FIELD,)
+            cell, column = (line.confidence, CONFIDENCE_FIELD) if is_confidence else (line.limit, "limit")
             faults.of(cell, column)(path, problem)
 
         _LIMITS[key].read(_written(line), (), report)
@@ -243,8 +246,8 @@ def _written(line: RequirementEntry) -> str | list[str] | dict[str, str]:
     It is a string, a list of strings for the key `declare`, or a section if the line has a confidence.
     """
     if line.confidence.text:
-        limit = {"limit": line.limit.text} if line.limit.text else {}
-        return {**limit, _CONFIDENCE: line.confidence.text}
+        limit = {LIMIT_FIELD: line.limit.text} if line.limit.text else {}
+        return {**limit, CONFIDENCE_FIELD: line.confidence.text}
     if line.key.text == "declare":
         return [word for word in re.split(r"[\s,;]+", line.limit.text.strip("[] ")) if word]
     return line.limit.text
@@ -343,8 +346,8 @@ class _Into:
         self.added.add(path)
         self._put(path, line.limit.text)
         if line.confidence.text:
-            self._put((*path, "limit"), line.limit.text)
-            self._put((*path, _CONFIDENCE), line.confidence.text)
+            self._put((*path, LIMIT_FIELD), line.limit.text)
+            self._put((*path, CONFIDENCE_FIELD), line.confidence.text)
 
     def _id(self, row_id: str, own_id: str) -> None:
         section, path = self._section("requirement_ids"), ("requirement_ids", row_id)

@@ -60,6 +60,10 @@ def assert_alike(one: Any, other: Any, where: str) -> None:
         assert other == pytest.approx(one, rel=room, abs=floor, nan_ok=True), where
     elif isinstance(one, DecidingShare) and isinstance(other, DecidingShare):
         assert_alike(astuple(one), astuple(other), where)
+    elif isinstance(one, dict) and isinstance(other, dict):  # percentiles
+        assert one.keys() == other.keys(), where
+        for key, value in one.items():
+            assert_alike(value, other[key], f"{where}.{key}")
     elif isinstance(one, tuple) and isinstance(other, tuple):
         assert len(one) == len(other), where
         for place, parts in enumerate(zip(one, other, strict=True)):

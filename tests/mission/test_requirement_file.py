@@ -260,6 +260,7 @@ class TestFaults:
             ),
             ("A,,cubic_phase_error,,95 %", "2:22: limit: is missing"),
             ("A,,declare,position,95 %", "2:21: confidence: declare has no confidence"),
+            ("A,,receiver.velocity.x,,95 %", "2:25: confidence: receiver.velocity.x has no confidence"),
         ],
     )
     def test_a_confidence_that_cannot_be_used_names_its_cell(self, stated, line, fault) -> None:

@@ -68,6 +68,8 @@ LOOSENED = [
     ("requirements/cubic_phase_error", "19 deg", set()),
     ("requirements/location_error", "101 m", {"requirements.location_error"}),
     ("requirements/location_error", "0.1 km", set()),
+    ("requirements/location_error", {"limit": "101 m"}, {"requirements.location_error"}),
+    ("requirements/location_error", {"limit": "100 m"}, set()),
     ("requirements/islr", "-14 dB", {"requirements.islr"}),
     ("requirements/islr", "-16 dB", set()),
     ("requirements/pslr", None, {"requirements.pslr"}),
@@ -498,3 +500,24 @@ class TestCommand:
 def commit(folder: Path) -> None:
     git(folder, "add", "-A")
     git(folder, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+
+
+SURE = {"limit": "100 m", "confidence": "95 %"}
+
+
+@pytest.mark.parametrize(
+    ("location", "texts"),
+    [
+        (SURE | {"confidence": "90 %"}, ("95 %", "90 %")),
+        ("100 m", ("95 %", "none")),
+        (SURE | {"confidence": "0.95"}, None),
+        (SURE | {"confidence": "99 %"}, None),
+    ],
+)
+def test_a_lower_confidence(location, texts) -> None:
+    changes = {name: value for name, value in ERRORS.items() if name not in ("allocation", "requirements")}
+    before, after = (findings(**changes, requirements={"location_error": limit}) for limit in (SURE, location))
+    loosened = [
+        entry for entry in compare(before, after).loosened if entry.id == "requirements.location_error.confidence"
+    ]
+    assert [(entry.before, entry.after) for entry in loosened] == ([] if texts is None else [texts])

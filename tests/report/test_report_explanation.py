@@ -109,7 +109,7 @@ def test_vibration_and_autofocus_are_what_the_derivation_prints() -> None:
 def evaluated(text: str) -> float:
     """Do the sum as a reader with a calculator would."""
     text = re.sub(r"\|([^|]*)\|", r"abs(\1)", text).replace("^", "**").replace("π", "pi")
-    names = {"pi": math.pi, "sqrt": math.sqrt, "abs": abs, "max": max, "min": min, "log": math.log}
+    names = {"pi": math.pi, "sqrt": math.sqrt, "abs": abs, "max": max, "min": min, "log": math.log, "erf": math.erf}
     return float(eval(text, {"__builtins__": {}}, names))
 
 
@@ -173,6 +173,54 @@ def repeat_by_hand(mission: Mission) -> None:
             assert results["utilization"] == pytest.approx(row.utilization, rel=1e-5, abs=1e-12), row.id
         if row.allowable is not None and row.unit not in ("rad",) and row.metric != "location_error":
             assert results["allowable"] == pytest.approx(row.allowable, rel=1e-5), row.id
+
+
+SURE = """
+requirements:
+  quadratic_phase_error: { limit: 45 deg, confidence: 90 % }
+  cubic_phase_error: { limit: 30 deg, confidence: 99.7 % }
+  location_error: { limit: 5 m, confidence: 95 % }
+"""
+BIASED = {
+    "platforms__transmitter__motion_error": {
+        "position": {"sigma": ["10 cm", "10 cm", "20 cm"], "bias": [0, 0, "5 cm"]},
+        "velocity": {"sigma": "5 mm/s", "bias": ["-2 mm/s", 0, 0]},
+        "distribution": {"position": "normal", "velocity": "uniform"},
+    },
+    "platforms__receiver__motion_error": {
+        "position": {"sigma": "50 cm", "bias": ["30 cm", "-10 cm", 0]},
+        "velocity": {"bias": ["2 mm/s", 0, "1 mm/s"]},
+        "acceleration": {"sigma": "20 um/s^2", "bias": "5 um/s^2"},
+        "distribution": {"position": "bound", "acceleration": "normal"},
+    },
+    "timing_error": {"constant": {"sigma": "1 ns", "bias": "2 ns"}, "linear": 1e-12},
+}
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("rule", ["rss", "sum", "each"])
+@pytest.mark.parametrize("asks", [True, False], ids=["sure", "one sigma"])
+def test_biases_and_confidences_can_be_repeated_by_hand(model: str, rule: str, asks: bool) -> None:
+    allocation = {"model": model, "combine": rule, **({} if asks else {"coverage_factor": 2})}
+    text = mission_text(**BIASED, allocation=allocation, **({"autofocus__n_pull": 2} if rule == "rss" else {}))
+    mission = parse_mission(text + SURE if asks else text)
+    repeat_by_hand(mission)
+    found = check_mission(mission, TODAY)
+    for row in found.rows:
+        results = dict(re.findall(r"(?m)^    (\w+) = (\S+)", explain(mission, found, row.id)))
+        if row.id in ("mission.cubic_phase_error", "mission.location_error") and row.declared is not None:
+            steps = {symbol: value for symbol, _, value in sums(explain(mission, found, row.id))}
+            declared = steps.get("combined") or float(results["combined"])
+            assert declared == pytest.approx(row.declared, rel=1e-5)
+        if row.bias is not None:
+            assert float(results["bias"]) == pytest.approx(row.bias, rel=1e-5)
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("rule", ["rss", "sum", "each"])
+def test_quantiles_of_sensors_can_be_repeated_by_hand(model: str, rule: str) -> None:
+    allocation = f"allocation: {{model: {model}, combine: {rule}}}\n"
+    repeat_by_hand(parse_mission(SENSORS.rstrip() + OSCILLATORS + SURE + "  islr: -20 dB\n" + allocation))
 
 
 @pytest.mark.parametrize("needs", ["", "pslr: -5 dB", "islr: -5 dB, cubic_phase_error: 30 deg"])

@@ -120,8 +120,9 @@ class TestText:
 
     def test_every_requirement_met(self) -> None:
         changes = {**UNJUDGED, "requirements": {"location_error": "10 m", "cubic_phase_error": "22.5 deg"}}
-        first = said("text", findings(**changes)).splitlines()[0]
-        assert first == "pass mission.yaml: every requirement is judged and met at 1 sigma"
+        first, second, *_ = said("text", findings(**changes)).splitlines()
+        assert first == "pass mission.yaml: every requirement is judged and met at 1 sigma,"
+        assert second == "  more than 99.99 % of collections"
 
     def test_a_requirement_that_is_waived_is_not_met(self) -> None:
         words = " ".join(said("text", findings(**WAIVED)).split())

@@ -19,7 +19,7 @@ from bisar_budget.report.formats.csv_table import CSV_COLUMNS, lines_of
 from bisar_budget.report.renderers import html, markdown, xlsx
 from bisar_budget.report.words.heading import rule_words
 from bisar_budget.report.words.requirements import declared_words, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words
+from bisar_budget.report.words.sentences import allowable_words, declared_size, matters, shown_use, use_words
 
 
 def document(report: Report, style: Style) -> doc.AnswerDocument:
@@ -70,7 +70,7 @@ def brief(findings: MissionFindings) -> doc.AnswerDocument:
             [
                 [
                     doc.Name(row.id),
-                    row_size(row.declared, row, findings),
+                    declared_size(row, findings),
                     allowable_words(row, findings),
                     use_words(shown_use(row)),
                     doc.Badge(row.status),

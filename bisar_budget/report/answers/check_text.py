@@ -12,7 +12,7 @@ from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report import document as doc
-from bisar_budget.report.answers.shared_blocks import requirement_table
+from bisar_budget.report.answers.shared_blocks import percentile_blocks, requirement_table
 from bisar_budget.report.answers.verify_answer import evidence
 from bisar_budget.report.renderers.text import lines
 from bisar_budget.report.words.heading import (
@@ -36,6 +36,7 @@ from bisar_budget.report.words.sentences import (
     allowable_words,
     binding_words,
     counted,
+    declared_size,
     matters,
     own_id,
     row_size,
@@ -72,7 +73,10 @@ def text_blocks(mission: MissionFindings | UnusableMission, style: Style) -> lis
         return [_unusable(mission, style)]
     if style.verbosity < 0:
         return [_brief(mission)]
-    above: list[doc.Block] = [_opening(mission), _requirements(mission), doc.Facts([*_head(mission, style)])]
+    above: list[doc.Block] = [_opening(mission), _requirements(mission)]
+    if style.verbosity > 0:
+        above += percentile_blocks(mission)
+    above.append(doc.Facts([*_head(mission, style)]))
     details, asides = list(_details(mission, style)), doc.Items([[text] for text in _asides(mission, style)])
     below = list(_evidence(mission))
 
@@ -212,6 +216,8 @@ def _row_table(rows: Sequence[Row], cells: Sequence[doc.Line], style: Style) -> 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     """Text below the table of rows: an explanation of its columns, and the number of hidden rows."""
     key = "use: declared / allowable"
+    if any(row.bias is not None for row in rows):
+        key += ", with a bias judged size / size at the limit"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: requirement that sets the allowable, or for QPE its table, equation or model"
     judged = [row for row in hidden if row.status != "not_declared"]
@@ -262,7 +268,7 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[doc.Block]:
     groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
-            yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission)
+            yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row, mission)], mission)
         elif STATUS[row.status].is_explained and not is_explained_in_table(row):
             groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
@@ -279,8 +285,10 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings)
     yield doc.Items([[f"  {text}"] for text in texts])
 
 
-def _more(row: Row) -> Iterator[str]:
+def _more(row: Row, mission: MissionFindings) -> Iterator[str]:
     yield f"from {row.equation}"
+    if row.bias is not None:
+        yield f"declared {declared_size(row, mission)}"
     if row.displacement_m is not None:
         x, y = row.displacement_m
         yield f"moves the image by {format_quantity(x, 'm')} east, {format_quantity(y, 'm')} north"

@@ -12,6 +12,7 @@ from bisar_budget.findings.requirement import REQUIREMENT_NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.heading import AboutMission, file_words, other_overrides
+from bisar_budget.report.words.percentiles import PERCENTILE_KEYS, percentile_lines, percentile_words
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import own_id, sentence
 from bisar_budget.report.words.wrong_verdicts import guard_sentences, risk_words, uncertain_use, verdict_words
@@ -99,6 +100,17 @@ def guard_blocks(guard: Guard | None) -> Iterator[doc.Block]:
     unknown = [requirement for requirement in guard.requirements if requirement.probability is None]
     if unknown or not quantified:
         yield doc.Items([[text] for text in guard_sentences(replace(guard, requirements=tuple(unknown)))])
+
+
+def percentile_blocks(findings: MissionFindings) -> Iterator[doc.Block]:
+    """Yield the table of percentiles of a mission for a terminal, and its explanation, if there are any."""
+    lines = list(percentile_lines(findings))
+    if not lines:
+        return
+    heads = doc.heads("not exceeded in", *doc.numbers(*(f"{name} %" for name in PERCENTILE_KEYS)))
+    rows = [[line.name, *line.sizes] for line in lines]
+    table = doc.TextTable("Percentiles", "Percentiles of the limited quantities", heads, rows)
+    yield doc.Close([table, doc.Items([[percentile_words(findings)]])])
 
 
 def _decided_by(line: RequirementLine) -> doc.Text:

@@ -410,7 +410,7 @@ def _value_text(mission: Mission, path: tuple[str, ...], value: float | None) ->
     if value is None:
         return "none"
     default = f"{math.degrees(value):g} deg" if path[-1] == "quadratic_phase_error" else f"{value:g}"
-    return texts_of_file(mission).get(path, f"{default} (default)")
+    return texts_of_file(mission).get(mission.written_path(path), f"{default} (default)")
 
 
 # ---------------------------------------------------------------------- results

@@ -18,14 +18,15 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
 from bisar_budget.report import document as doc
 from bisar_budget.report.words.identity import source_path
+from bisar_budget.report.words.percentiles import with_confidence
 from bisar_budget.report.words.sentences import (
     allowable_words,
     dashed,
+    declared_size,
     matters,
     percent,
     phase_limit,
     phase_unit,
-    row_size,
     sentence,
     shown_use,
     use_words,
@@ -128,7 +129,7 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
                 (name, doc.Styled("own-id", doc.Name(row.requirement_id))) if row.requirement_id else name,
                 doc.Badge(row.status),
                 (dashed(use_words(use)), doc.Use(use, row.status)),
-                dashed(row_size(row.declared, row, page.findings)),
+                dashed(declared_size(row, page.findings)),
                 dashed(allowable_words(row, page.findings)),
                 "–" if row.is_unjudged else margin(row),
                 source_of_limit(page, row),
@@ -211,6 +212,11 @@ def source_of_limit(page: Page, row: Row) -> str:
     """Text about the requirement that sets the allowable of a row."""
     findings, requirements, allocation = page.findings, page.mission.requirements, page.findings.allocation
     binding = row.binding_requirement if row.metric == "quadratic_phase_error" else row.metric
+    judged = {requirement.key: requirement for requirement in findings.requirements}
+
+    def phase_words(value: float, key: str) -> str:
+        return with_confidence(phase_limit(value, findings), judged.get(key))
+
     if binding in ("pslr", "islr"):
         value = requirements.pslr if binding == "pslr" else requirements.islr
         effect = "paired echoes" if binding == "pslr" else "power spread"
@@ -220,12 +226,14 @@ def source_of_limit(page: Page, row: Row) -> str:
         return f"{effect} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
-        return "none stated" if value is None else f"cubic phase ≤ {phase_limit(value, findings)}"
+        return "none stated" if value is None else f"cubic phase ≤ {phase_words(value, binding)}"
     if binding == END_OF_IMAGE:
         return "end of the image: no ground point has the range history of a larger error"
     if binding == "location_error":
         value = requirements.location_error
-        return "none stated" if value is None else f"displacement ≤ {limit_words(value, 'm')}"
+        if value is None:
+            return "none stated"
+        return f"displacement ≤ {with_confidence(limit_words(value, 'm'), judged.get(binding))}"
     if row.metric == SPECIFICATION:
         return "specified size of the error"
     if row.metric == DECLARE:
@@ -234,7 +242,7 @@ def source_of_limit(page: Page, row: Row) -> str:
         return limit_form.format(phase_limit(allocation.qpe_total, findings))
     limit = allocation.qpe_allowed(row.owner)
     share = "" if row.owner == "mission" else f", {allocation.qpe.of(row.owner):.3g} of the budget"
-    return f"QPE ≤ {phase_limit(limit, findings)}{share}"
+    return f"QPE ≤ {phase_words(limit, 'quadratic_phase_error')}{share}"
 
 
 def method(row: Row, verdict: str | None) -> str:

@@ -44,22 +44,32 @@ from bisar_budget.report.words.heading import (
     rule_words,
 )
 from bisar_budget.report.words.identity import source_path
+from bisar_budget.report.words.percentiles import (
+    PERCENTILE_KEYS,
+    has_percentiles,
+    percentile_lines,
+    percentile_words,
+)
 from bisar_budget.report.words.requirements import (
     confidence_words,
     kind_names,
     requirement_lines,
+    share_of_collections,
     shifted_names,
     unjudged_effects,
     unseen,
     verdict,
 )
 from bisar_budget.report.words.sentences import (
+    confidence_asked,
     counted,
     dashed,
     measure,
     own_id,
     phase_limit,
+    requirement_limit,
     requirement_size,
+    row_size,
     sentence,
     shown_use,
     waiver_names,
@@ -294,6 +304,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     yield doc.Paragraph(f"{sentence(verdict(findings))}. {sentence(rule_words(findings))}.")
     yield _requirements(page)
     yield from guard_blocks(findings.guard)
+    yield from [] if page.is_brief else _how_sure(page)
     facts: list[tuple[doc.Text, doc.Text]] = [
         ("Not judged", f"{effect.text} ({', '.join(row.id for row in effect.rows)})")
         for effect in unjudged_effects(findings)
@@ -344,6 +355,29 @@ def _requirements(page: Page) -> doc.TextTable:
     columns = doc.heads(*ids, "Requirement", *sizes, "Status", "Verification", "Decided by")
     caption = "Requirements and their verdicts"
     return doc.TextTable(f"Requirements of {page.name}", caption, columns, lines, "requirements")
+
+
+def _how_sure(page: Page) -> Iterator[doc.Block]:
+    """Yield the table of percentiles, with the confidence of each limit and the share of collections that keep it."""
+    lines: list[doc.Line] = []
+    for line in percentile_lines(page.findings):
+        requirement = line.requirement
+        limit = (
+            (
+                dashed(requirement_limit(requirement.value, requirement)),
+                confidence_asked(requirement) or "–",
+                "–" if requirement.probability is None else share_of_collections(requirement.probability),
+            )
+            if line.is_limited
+            else ("", "", "")
+        )
+        lines.append((sentence(line.name.strip()), *line.sizes, *limit))
+    if lines:
+        sizes = (*(f"{name} %" for name in PERCENTILE_KEYS), "Limit", "Confidence asked", "Collections within it")
+        words = percentile_words(page.findings).removesuffix(".")
+        caption = f"How sure: {words[:1].lower()}{words[1:]}"
+        columns = doc.heads("Quantity", *doc.numbers(*sizes))
+        yield doc.TextTable(f"Percentiles of {page.name}", caption, columns, lines, "percentiles")
 
 
 def _declarations(page: Page) -> Iterator[doc.Block]:
@@ -534,6 +568,10 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         else "the file’s value"
     )
     yield "Declared", f"for position, velocity, acceleration and clock {factor}"
+    if has_percentiles(findings):
+        yield "Confidence", _confidence_words(findings)
+    if biases := [f"{row.id} {row_size(row.bias, row, findings)}" for row in findings.rows if row.bias is not None]:
+        yield "Biases", f"known and constant, with their sign: {', '.join(biases)}"
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
         if any(error.stated(kind.name) for kind in STATE_KINDS):
@@ -603,6 +641,26 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 
 
+_QUANTILE_WORDS = {
+    "each": "every error alone at its quantile",
+    "sum": "the sum of the quantiles of all errors",
+    "rss": "the quantile of all errors together, and of those of a platform",
+}
+
+
+def _confidence_words(findings: MissionFindings) -> str:
+    """Text on the meaning of a confidence, and on the distributions of the errors."""
+    text = (
+        "the probability that the effect of all declared errors, drawn together, keeps a limit. Each error has its "
+        "declared distribution, and a bound is at either end; clocks, sensors, covariances and delays of the air are "
+        "normal; biases are constant. PSLR and ISLR are expectations. Percentiles are of all errors together, "
+        "whatever the combination"
+    )
+    if any(requirement.confidence is not None for requirement in findings.requirements):
+        text += f". A requirement with a confidence judges {_QUANTILE_WORDS[findings.combine]}"
+    return text
+
+
 def _air_of(propagation: Propagation) -> str:
     """Text about the atmospheric delays: whether they are the same for both platforms, and how fast they change."""
     legs = {name: propagation.leg(name) for name in Platforms._fields}
@@ -650,6 +708,8 @@ def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
         value = requirement_size(judged[key].value, judged[key], "down")
         if key == "quadratic_phase_error":
             value += f" ({requirements.quadratic_phase_error:.4g} rad)"
+        confidence = confidence_asked(judged[key])
+        value += f" with {confidence} confidence" if confidence else ""
         yield value_from(name, value, ("requirements", key))
     allocation = mission.allocation
     split = allocation.split

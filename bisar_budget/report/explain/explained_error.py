@@ -405,6 +405,7 @@ def missing(mission: Mission, path: KeyPath) -> str:
 
 def as_written(mission: Mission, path: KeyPath) -> str:
     """A value of the mission file as `key: value`; if the file lacks its key, the nearest parent key is used."""
+    path = mission.written_path(path)
     while path and path not in mission.places:
         path = path[:-1]
     text = getattr(mission.places.get(path), "value", None)

@@ -23,7 +23,7 @@ from bisar_budget.effects.air_delays import (
     legs_of,
     metres_per_unit,
 )
-from bisar_budget.effects.declared import CUBIC, LOCATION
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import (
     arm_at,
@@ -63,6 +63,7 @@ from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
+from bisar_budget.report.explain.explained_confidence import quantile_step
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
 from bisar_budget.report.explain.explained_navigation import navigation_steps
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
@@ -282,7 +283,7 @@ def _displacement(error: RandomError, model: str) -> Iterator[Step]:
         title if error.is_covered else "In any direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
         WorkedEquation(
-            "moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, float(effect.displacement), unit
+            "moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, plain(effect.displacement), unit
         ),
     )
 
@@ -728,32 +729,42 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     if row.reason is not None and row.reason.code == "wideband-has-no-spectrum":
         yield step("Allowable: not known", row.reason)
         return
-    effect = error.effect(model)
-    limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
+    effect, confidence_of = error.effect(model), mission.requirements.confidence_of
+    judged = error.judged_effect(model, confidence_of, allocation.autofocus_gain)._replace(covariance=None).of(0)
+    limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain, judged)
     limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an error stated by its effect on the image has no quadratic phase
         yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
     required = mission.requirements
 
-    def by(name: str, part: str, allowed: float, per_unit: float, title: str) -> Step:
+    def by(name: str, symbol: str, allowed: float, per_unit: float, title: str) -> Step:
         sizes[name] = allowed / per_unit
-        values = {"limit": allowed, part: per_unit}
-        return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
+        values = {"limit": allowed, symbol: per_unit}
+        return step(title, WorkedEquation(name, f"limit/({symbol})", values, sizes[name], _unit(error)))
 
-    part = "QPE/unit"
+    symbol, rms_phase = "QPE/unit", plain(effect.judged(allocation.autofocus_gain))
     if effect.hidden:
-        part, gain = "judged/unit", allocation.autofocus_gain
+        symbol, gain = "judged/unit", allocation.autofocus_gain
         values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
         worked = WorkedEquation(
-            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, limited.quadratic, f"rad per {_unit(error)}"
+            symbol, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad{_per(error)}"
         )
         yield step("With the hidden phase, which autofocus does not correct", worked)
     if limited.quadratic:
-        yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
+        if (confidence := error.is_covered and confidence_of(QUADRATIC)) and rms_phase:
+            unit = f"rad{_per(error)}"
+            yield quantile_step("quantile/unit", symbol, rms_phase, plain(limited.quadratic), unit, confidence)
+            symbol = "quantile/unit"
+        yield by("by_QPE", symbol, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
-        yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)
+        symbol = "cubic/unit"
+        if confidence := error.is_covered and confidence_of(CUBIC):
+            unit = f"rad{_per(error)}"
+            yield quantile_step("quantile/unit", symbol, plain(effect.cubic), plain(judged.cubic), unit, confidence)
+            symbol = "quantile/unit"
+        yield by("by_cubic", symbol, required.cubic_phase_error, plain(judged.cubic), title)
     if limited.spread and required.islr is not None:
         spread = "left/unit"
         if limited.spread != effect.spread:
@@ -773,7 +784,11 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
-        yield by("by_location", "moved/unit", required.location_error, float(effect.displacement), title)
+        symbol, rms_move, moved = "moved/unit", plain(effect.displacement), plain(judged.displacement)
+        if confidence := error.is_covered and confidence_of(LOCATION):
+            yield quantile_step("quantile/unit", symbol, rms_move, moved, f"m{_per(error)}", confidence)
+            symbol = "quantile/unit"
+        yield by("by_location", symbol, required.location_error, moved, title)
     yield from smallest_size(row, sizes)
 
 
@@ -796,3 +811,8 @@ def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limi
 
 def _unit(error: RandomError) -> str:
     return "" if error.unit == "dB" else error.unit
+
+
+def _per(error: RandomError) -> str:
+    """End of the unit of an effect of one unit of an error; empty for a level in dB."""
+    return f" per {error.unit}" if _unit(error) else ""

@@ -10,6 +10,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import cubics, quadratics
+from bisar_budget.analysis.totals import IsMember, Totals
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits, tone_limits
 from bisar_budget.arrays import Floats
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
@@ -33,7 +34,7 @@ from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
 from bisar_budget.effects.slow_tones import SlowTone
-from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
+from bisar_budget.effects.vibration import DeclaredPhase, lines_of, near_lines, seen_of_axes, worst_phases
 from bisar_budget.error_kinds.random_kinds import VIBRATION_KIND
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -48,6 +49,14 @@ from bisar_budget.mission.readers import SectionValue
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.report.explain import notation
+from bisar_budget.report.explain.explained_confidence import (
+    SizeRule,
+    biased_use,
+    judged_steps,
+    reaching_size,
+    rules_of,
+    total_steps,
+)
 from bisar_budget.report.explain.explained_error import (
     RULE_WORDS,
     as_written,
@@ -75,7 +84,7 @@ from bisar_budget.report.explain.explained_spreading import (
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import own_id, percent, row_limit, row_size, wrapped
+from bisar_budget.report.words.sentences import declared_size, own_id, percent, row_limit, row_size, wrapped
 
 _CONTINUATION_COLUMNS = 3  # additional indent of continued lines, at which no equals sign is expected
 _MAX_UNIT_CHARACTERS = 16  # of a unit after a number
@@ -150,6 +159,7 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
+        yield from judged_steps(analysis, source)
         yield from effect(analysis, source, row.model)
         yield from _budget(analysis, source, row)
     elif (random_error := next((error for error in analysis.random if error.id == row.id), None)) is not None:
@@ -162,6 +172,9 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
     if row.subject.axis == "spur" and row.allowable is not None:
         yield from use_of_amplitudes(row)
     elif row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
+        if source is not None and row.bias is not None:
+            yield biased_use(analysis, source, row)
+            return
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
 
@@ -206,45 +219,69 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     model = analysis.full if row.model == "full" else analysis.published
     by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
     sizes: dict[str, float] = {}
-    if by_quadratic is not None and model.ends_image(source, by_quadratic):
-        sizes["by_image"] = by_quadratic
-    elif by_quadratic is not None:
-        sizes["by_QPE"] = by_quadratic
-        if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
-            yield from at_the_allowable(analysis, source, by_quadratic)
+    rules = rules_of(analysis, source)
+    if by_quadratic is not None:
+        rule = rules[QUADRATIC]
+        reached = by_quadratic if rule.is_plain else reaching_size(model, source, QUADRATIC, limit)
+        if reached is None or model.ends_image(source, reached):
+            sizes["by_image"] = by_quadratic
         else:
-            values, formula = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}, "limit/(QPE/unit)"
-            hidden = model.hidden_per_unit(source)
-            if hidden:
-                values |= {"hidden/unit": hidden, "gain": allocation.autofocus_gain}
-                formula = "limit/sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)"
-            yield step(
-                "Allowable by the quadratic phase", WorkedEquation("by_QPE", formula, values, by_quadratic, row.unit)
-            )
-    other_limits = (
+            sizes["by_QPE"] = by_quadratic
+            yield from _reaching_quadratic(analysis, source, row, limit, reached, rule)
+            if not rule.is_plain:
+                yield rule.allowable_step(reached, by_quadratic)
+    for name, symbol, required, unit in (
         (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
         (LOCATION, "by_location", requirements.location_error, "m"),
-    )
-    for name, symbol, required, unit in other_limits if source.is_motion else ():
-        size = None if required is None else model.allowable(source, name, required)
+    ):
+        if required is None or not source.is_motion:
+            continue
+        size, rule = model.allowable(source, name, required), rules[name]
         if name == row.binding_requirement:
             size = row.allowable  # the search of the check may differ in the last digits
-        if required is None or size is None:
+        if size is None:
             continue
-        if model.ends_image(source, size):
+        reached = size if rule.is_plain else reaching_size(model, source, name, required)
+        if reached is None or model.ends_image(source, reached):
             sizes["by_image"] = size
             continue
         sizes[symbol] = size
         title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
+        if not rule.is_plain:
+            title = title.replace("Allowable by", "Size at the limit of")
+            symbol = symbol.replace("by_", "limit_")
         if row.model == "full" and not analysis.full.is_linear_at(source, name, required):
-            yield step(title, f"{symbol} = {with_unit(size, row.unit)}")
-            yield from at_the_allowable(analysis, source, size, name)
+            yield step(title, f"{symbol} = {with_unit(reached, row.unit)}")
+            yield from at_the_allowable(analysis, source, reached, name)
         else:
             values = {"limit": required, "effect/unit": required / model.small(source, name, required)}
-            yield step(title, WorkedEquation(symbol, "limit/(effect/unit)", values, size, row.unit))
+            yield step(title, WorkedEquation(symbol, "limit/(effect/unit)", values, reached, row.unit))
+        if not rule.is_plain:
+            yield rule.allowable_step(reached, size)
     if "by_image" in sizes:
         yield from end_of_the_image(sizes["by_image"], row.unit)
     yield from smallest_size(row, sizes)
+
+
+def _reaching_quadratic(
+    analysis: Analysis, source: ErrorSource, row: Row, limit: float, reached: float, rule: SizeRule
+) -> Iterator[Step]:
+    """Yield the explanation steps for the size `reached` at which the quadratic phase of an error is at its limit."""
+    model = analysis.full if row.model == "full" else analysis.published
+    title, symbol = "Allowable by the quadratic phase", "by_QPE"
+    if not rule.is_plain:
+        title, symbol = "Size at the limit of the quadratic phase", "limit_QPE"
+    if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
+        if not rule.is_plain:
+            yield step(title, f"{symbol} = {with_unit(reached, row.unit)}")
+        yield from at_the_allowable(analysis, source, reached)
+        return
+    values, formula = {"limit": limit, "QPE/unit": abs(float(model.effect(source).qpe))}, "limit/(QPE/unit)"
+    hidden = model.hidden_per_unit(source)
+    if hidden:
+        values |= {"hidden/unit": hidden, "gain": float(analysis.allocation.autofocus_gain)}
+        formula = "limit/sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)"
+    yield step(title, WorkedEquation(symbol, formula, values, reached, row.unit))
 
 
 def _vibration_in_its_unit(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
@@ -550,18 +587,15 @@ def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) ->
         else "QPE of the declared errors"
     )
     if gain == 1 or rule == "each" or row.model != "full":
-        sizes_by_name = together.phase_parts(together.judged_parts(members), rule)
-        yield from combined(title, rule, sizes_by_name, row.declared)
+        yield from _phases_together(analysis, row, title, members, row.declared, float(gain))
         yield from limit_steps(allocation, owner, row.allowable or 0.0)
         return
-    yield from combined(
-        title, rule, together.phase_parts(together.judged_parts(members, gain=1.0), rule), row.declared
-    )
+    yield from _phases_together(analysis, row, title, members, row.declared, 1.0)
     judged, limit = float(together.judged(members)[0]), allocation.qpe_allowed(owner)
+    if rule == "rss":
+        judged = _total_of(analysis, row, judged, float(gain))
     title = "Judged, with hidden phases times the gain: autofocus corrects none of them"
-    yield from combined(
-        title, rule, together.phase_parts(together.judged_parts(members), rule), judged, symbol="judged"
-    )
+    yield from _phases_together(analysis, row, title, members, judged, float(gain), symbol="judged")
     yield from limit_steps(allocation, owner, limit)
     if row.declared and row.allowable is not None:
         values = {"limit": limit, "combined": row.declared, "judged": judged}
@@ -569,10 +603,56 @@ def _phase_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) ->
         yield step("Allowable, as a phase of equal peak loss", worked)
 
 
+def _is_member(analysis: Analysis, row: Row) -> IsMember:
+    split = analysis.allocation.qpe
+    return lambda owner: split.includes(owner, row.owner)
+
+
+def _total_of(analysis: Analysis, row: Row, root_sum_square: float, gain: float) -> float:
+    """Quadratic phase that the requirement judges for the owner of a row, under root-sum-square. [rad]"""
+    of_case = np.array([root_sum_square])
+    return float(Totals(analysis).reached(_model(row), QUADRATIC, _is_member(analysis, row), of_case, gain)[0])
+
+
+def _phases_together(
+    analysis: Analysis,
+    row: Row,
+    title: str,
+    members: Sequence[DeclaredPhase],
+    total: float | None,
+    gain: float,
+    symbol: str = "combined",
+) -> Iterator[Step]:
+    """Yield the explanation steps that combine the quadratic phases of errors to the total that is judged. [rad]"""
+    together, rule = analysis.together(_model(row)), analysis.mission.allocation.combine
+    sizes_by_name = together.phase_parts(together.judged_parts(members, gain=gain), rule)
+    if rule != "rss" or not Totals(analysis).is_asked(QUADRATIC):
+        yield from combined(title, rule, sizes_by_name, total, symbol=symbol)
+        return
+    root_sum_square = float(together.judged(members, gain=gain)[0])
+    yield from combined(title, rule, sizes_by_name, root_sum_square, symbol="rss")
+    yield from total_steps(
+        analysis,
+        _model(row),
+        QUADRATIC,
+        _is_member(analysis, row),
+        root_sum_square,
+        total,
+        gain=gain,
+        symbol=symbol,
+    )
+
+
 def _cubic_aggregate(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
     together = analysis.together(_model(row))
-    sizes_by_name = together.phase_parts(cubics(together.phases))
-    yield from combined("Cubic phase of the declared errors", findings.combine, sizes_by_name, row.declared)
+    phases = cubics(together.phases)
+    sizes_by_name, title = together.phase_parts(phases), "Cubic phase of the declared errors"
+    if findings.combine == "rss" and Totals(analysis).is_asked(CUBIC):
+        root_sum_square = float(together.combined(phases)[0])
+        yield from combined(title, findings.combine, sizes_by_name, root_sum_square, symbol="rss")
+        yield from total_steps(analysis, _model(row), CUBIC, lambda owner: True, root_sum_square, row.declared)
+    else:
+        yield from combined(title, findings.combine, sizes_by_name, row.declared)
     if row.allowable is not None:
         yield step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
@@ -646,7 +726,12 @@ def _location_aggregate(analysis: Analysis, findings: MissionFindings, row: Row)
     else:
         lengths = [(name, math.hypot(*move)) for name, move in moves]
         title = f"{title}: displacement of the declared errors"
-        yield from combined(title, findings.combine, lengths, row.declared, unit="m")
+        if findings.combine == "rss" and Totals(analysis).is_asked(LOCATION):
+            root_sum_square = math.sqrt(math.fsum(length * length for _, length in lengths))
+            yield from combined(title, findings.combine, lengths, root_sum_square, unit="m", symbol="rss")
+            yield from total_steps(analysis, _model(row), LOCATION, lambda owner: True, root_sum_square, row.declared)
+        else:
+            yield from combined(title, findings.combine, lengths, row.declared, unit="m")
     if row.allowable is not None:
         key_location = location(mission, ("requirements", "location_error"))
         yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {key_location}")
@@ -683,7 +768,7 @@ ROW_STEPS: Mapping[str, Callable[[Analysis, MissionFindings, Row], Iterator[Step
 def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
-    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, findings)}"
+    declared = "" if row.declared is None else f", declared {declared_size(row, findings)}"
     allowable = "" if row.allowable is None else f", allowable {row_limit(row, findings)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)

@@ -304,6 +304,7 @@ def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Ide
         metric=row.metric,
         unit=row.unit,
         declared=row.declared,
+        bias=row.bias,
         allowable=row.allowable,
         binding_requirement=row.binding_requirement,
         utilization=row.utilization,
@@ -334,6 +335,8 @@ def _requirement(
         decided_by=requirement.row,
         requirement_id=requirement.requirement_id,
         **share_columns(requirement),
+        confidence_required=requirement.confidence,
+        probability=requirement.probability,
     )
     return result | _suppressed(requirement.status, requirement.waivers, artifact)
 

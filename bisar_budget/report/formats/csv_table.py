@@ -4,6 +4,10 @@ The column `kind` states whether a line is a requirement or a row. The line of a
 `requirement.islr`. Its column `declared` has the reached value, `allowable` the required value, and `decided_by` the
 id of the deciding row. If the share of a platform or of the clock decides the status, the utilization refers to this
 share. The columns `share_allowed` and `share_reached` then have its allowed and its reached value.
+
+The column `confidence_required` has the confidence that the file states for a requirement, and `probability` the
+share of collections that keep the limit. `percentile_50` is the size that the effect of all errors does not exceed
+with a probability of 50 %.
 """
 
 import csv
@@ -17,6 +21,7 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.heading import overrides_words
+from bisar_budget.report.words.percentiles import PERCENTILE_COLUMNS, percentile_columns
 from bisar_budget.report.words.requirements import requirement_id, share_columns, use_remarks
 from bisar_budget.report.words.sentences import spreadsheet_text
 
@@ -61,6 +66,8 @@ CSV_COLUMNS = (
     "confidence",
     "equal_loss_qpe_rad",
     "rest_rad",
+    "bias",
+    *PERCENTILE_COLUMNS,
 )
 
 
@@ -160,6 +167,7 @@ def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
         "kind": "requirement",
         "decided_by": requirement.row,
         **share_columns(requirement),
+        **percentile_columns(requirement),
         "waived_by": _waived_by(requirement),
     }
 

@@ -1,8 +1,8 @@
 """Write the requirements of missions with their status as CSV.
 
-The first columns are the same as in a requirements file. A line contains a requirement id of the project and the
-requirement or row to which the id is assigned. A requirement without such an id has a line of its own. A mission can
-read the CSV file with `requirements: {file: …}`; the columns after `limit` are then ignored.
+The first columns, and the last one, are the same as in a requirements file. A line contains a requirement id of the
+project and the requirement or row to which the id is assigned. A requirement without such an id has its own line. A
+mission can read the CSV file with `requirements: {file: …}`; the columns from `status` to `overrides` are ignored.
 """
 
 import math
@@ -16,11 +16,11 @@ from bisar_budget.report import Piece, Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.requirements import requirement_finding, requirement_lines
-from bisar_budget.report.words.sentences import finding, row_size, shown_use, use_words
+from bisar_budget.report.words.sentences import confidence_asked, declared_size, finding, shown_use, use_words
 
 _STATUS_COLUMNS = (
     *("id", "text", "key", "limit"),
-    *("status", "reached", "use", "decided_by", "file", "finding", "overrides"),
+    *("status", "reached", "use", "decided_by", "file", "finding", "overrides", "confidence"),
 )
 
 
@@ -31,7 +31,7 @@ def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
     """
     if isinstance(mission, UnusableMission):
         faults = "; ".join(map(str, mission.faults))
-        return csv_text([["", "", "", "", mission.status, "", "", "", mission.file, faults, ""]])
+        return csv_text([["", "", "", "", mission.status, "", "", "", mission.file, faults, "", ""]])
     return csv_text([*_requirements(mission), *_rows(mission)])
 
 
@@ -44,7 +44,8 @@ def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
     for line in requirement_lines(mission):
         requirement = line.requirement
         sizes = (requirement.status, line.reached, line.use, requirement.row or "")
-        result = [*sizes, mission.file, requirement_finding(requirement, mission), overrides_words(mission)]
+        result = [*sizes, mission.file, requirement_finding(requirement, mission)]
+        result += [overrides_words(mission), confidence_asked(requirement)]
         for own_id in requirement.requirement_ids or ("",):
             text = mission.requirement_texts.get(own_id, "")
             yield [own_id, text, requirement.key, limit_of_file(requirement, mission), *map(_or_empty, result)]
@@ -52,8 +53,8 @@ def _requirements(mission: MissionFindings) -> Iterator[list[str]]:
 
 def _rows(mission: MissionFindings) -> Iterator[list[str]]:
     for row in mission.rows:
-        sizes = (row.status, row_size(row.declared, row, mission), use_words(shown_use(row)), row.id)
-        result = [*sizes, mission.file, finding(row, mission), overrides_words(mission)]
+        sizes = (row.status, declared_size(row, mission), use_words(shown_use(row)), row.id)
+        result = [*sizes, mission.file, finding(row, mission), overrides_words(mission), ""]
         for own_id in row.requirement_ids:
             yield [own_id, mission.requirement_texts.get(own_id, ""), row.id, "", *map(_or_empty, result)]
 

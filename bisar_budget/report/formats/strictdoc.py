@@ -18,7 +18,7 @@ from bisar_budget.report.formats.requirement_list import limit_of_file
 from bisar_budget.report.formats.traceability import identifier, origin
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import finding, row_limit
+from bisar_budget.report.words.sentences import confidence_asked, finding, row_limit
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,8 @@ def _sentence(requirement: JudgedRequirement, mission: MissionFindings) -> str:
     limit = limit_of_file(requirement, mission)
     if requirement.key == DECLARE:
         return f"The mission file shall declare the errors {limit}."
-    return f"The {requirement.name} shall be at most {limit}."
+    confidence = confidence_asked(requirement)
+    return f"The {requirement.name} shall be at most {limit}{confidence and f' with {confidence} confidence'}."
 
 
 def _row_sentence(row: Row, mission: MissionFindings) -> str:

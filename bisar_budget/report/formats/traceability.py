@@ -110,6 +110,8 @@ def _requirement_case(
         ("unit", requirement.unit or None),
         ("value", requirement.value),
         ("allowed", requirement.allowed),
+        ("confidence_required", requirement.confidence),
+        ("probability", requirement.probability),
         ("reached", requirement.reached),
         ("utilization", requirement.utilization),
         ("decided_by", requirement.row),

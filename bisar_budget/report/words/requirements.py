@@ -12,6 +12,7 @@ from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.mission.model import id_of_requirement
 from bisar_budget.phrases import Note
+from bisar_budget.report.words.percentiles import limit_asked
 from bisar_budget.report.words.sentences import (
     counted,
     own_id,
@@ -57,7 +58,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
         yield RequirementLine(
             requirement=requirement,
             name=requirement.name,
-            allowed=requirement_limit(requirement.value, requirement),
+            allowed=limit_asked(requirement),
             reached=requirement_size(requirement.reached, requirement),
             use=use_words(None if requirement.value is None or is_open else requirement.utilization),
             status=requirement.status,
@@ -148,15 +149,15 @@ _HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error
 def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings) -> str:
     """Sentence with the status, values and remarks of a requirement.
 
-    If the requirement is met, the sentence also states the confidence.
+    If a requirement without a stated confidence is met, the sentence also gives the confidence that follows from the
+    declared sizes.
     """
     text = f"{requirement.name}{own_id(requirement)}"
     if requirement.value is not None:
-        limit = requirement_limit(requirement.value, requirement)
-        text += f" of {limit}{' (default)' if requirement.is_default else ''}"
+        text += f" of {limit_asked(requirement)}{' (default)' if requirement.is_default else ''}"
     status = STATUS[requirement.status]
     text += f": {status.words}"
-    if status.is_held and not status.fails and requirement.key in _HAS_CONFIDENCE:
+    if status.is_held and not status.fails and requirement.key in _HAS_CONFIDENCE and not requirement.confidence:
         text += f" {_confidence_of(requirement, mission)}"
     if requirement.reached is not None:
         text += f", {requirement_size(requirement.reached, requirement)} reached"
@@ -167,12 +168,13 @@ def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings
 
 
 def _confidence_of(requirement: JudgedRequirement, mission: MissionFindings) -> str:
-    """Confidence at which a mission meets a requirement, in words."""
-    if requirement.confidence is not None:
-        return f"with {100 * requirement.confidence:.8g} % confidence"
+    """Confidence, in words, at which a mission meets a requirement for which the file states no confidence."""
+    of_sizes: object = mission.confidence
+    if mission.confidence.code == "stated-confidence":  # other requirements state a confidence
+        of_sizes = mission.confidence.values[-1]
     if requirement.probability is None or requirement.probability == 1:
-        return str(mission.confidence)
-    return f"{mission.confidence}, {share_of_collections(requirement.probability)} of collections"
+        return str(of_sizes)
+    return f"{of_sizes}, {share_of_collections(requirement.probability)} of collections"
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:

@@ -95,13 +95,23 @@ def measure(row: Row, mission: MissionFindings) -> str:
         declared = row_size(row.declared, row, mission)
         declared = f"noise {declared}" if declared == AS_DECLARED else f"noise {declared} on the declared one"
     else:
-        declared = f"declared {row_size(row.declared, row, mission)}"
+        declared = f"declared {declared_size(row, mission)}"
     if row.allowable is None:
         return declared
-    text = f"{declared}, allowable {row_limit(row, mission)}"
+    text = f"{declared}, allowable {row_limit(row, mission)}{_confidence_of(row, mission)}"
     if binding := binding_words(row):
         text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
+
+
+def _confidence_of(row: Row, mission: MissionFindings) -> str:
+    """Confidence of the requirement that sets the allowable of a row, in brackets with a leading space.
+
+    The text is empty if the requirement has no confidence.
+    """
+    key = row.metric if row.binding_requirement is None else row.binding_requirement
+    asked = {requirement.key: confidence_asked(requirement) for requirement in mission.requirements}.get(key, "")
+    return f" ({asked})" if asked else ""
 
 
 def cause(row: Row) -> str:
@@ -190,6 +200,12 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
     return format_in(_level(value, row.unit), row.unit, unit, 3, rounding)
 
 
+def declared_size(row: Row, mission: MissionFindings) -> str:
+    """Write the declared size of a row, and its bias with its sign if it has one: `5 mm/s, bias -2 mm/s`."""
+    declared = row_size(row.declared, row, mission)
+    return declared if row.bias is None else f"{declared}, bias {row_size(row.bias, row, mission)}"
+
+
 def row_limit(row: Row, mission: MissionFindings) -> str:
     """Write the allowable of a row, rounded down so that the row passes if the written value is copied into a file.
 
@@ -227,6 +243,11 @@ def phase_unit(mission: MissionFindings) -> str:
 def phase_limit(value: float, mission: MissionFindings) -> str:
     """Write an allowed phase [rad] in the unit of the quadratic phase requirement, rounded down."""
     return format_in(value, "rad", phase_unit(mission), 3, "down")
+
+
+def confidence_asked(requirement: JudgedRequirement) -> str:
+    """Confidence with which the file asks for a limit, such as `95 %`; empty without one."""
+    return "" if requirement.confidence is None else f"{100 * requirement.confidence:.8g} %"
 
 
 def requirement_limit(value: float | None, requirement: JudgedRequirement) -> str:
