@@ -253,6 +253,7 @@ class ErrorBlock:
         self.is_biased = bool(self.bias.any())
         self.moves = [index for index, source in enumerate(sources) if source.displaces]
         self._per_unit: dict[str, Floats] = {}
+        self._judged_sizes: dict[float | None, Floats] = {}
         self._follows: PointPaths | None = None
 
     # ---------------------------------------------------------------- sizes that requirements judge
@@ -264,9 +265,11 @@ class ErrorBlock:
         confidence = self.table.confidence(requirement)
         if confidence is None and not self.is_biased:
             return self.declared
-        sizes = self._by_error(judged_size, np.nan_to_num(self.declared), confidence)
-        sizes = np.copysign(sizes, np.where(self.declared == 0, self.bias, self.declared))
-        return np.where(np.isnan(self.declared), math.nan, sizes)
+        if confidence not in self._judged_sizes:
+            sizes = self._by_error(judged_size, np.nan_to_num(self.declared), confidence)
+            sizes = np.copysign(sizes, np.where(self.declared == 0, self.bias, self.declared))
+            self._judged_sizes[confidence] = np.where(np.isnan(self.declared), math.nan, sizes)
+        return self._judged_sizes[confidence]
 
     def _by_error(
         self, of: Callable[[str, PerCase, PerCase, float | None], PerCase], sizes: Floats, confidence: float | None
@@ -561,6 +564,13 @@ class ErrorBlock:
         confidences = [self.table.confidence(requirement) for requirement in LIMITING_REQUIREMENTS]
         if not self.is_biased and not any(confidences):
             return self.reaching(model, limits, is_complete=is_complete)
+        stated = {confidence for limit, confidence in zip(limits, confidences, strict=True) if limit is not None}
+        if not self.is_biased and len(stated) == 1:
+            reached, (level,) = self.reaching(model, limits, is_complete=is_complete), stated
+            smallest, quadratic = (
+                self._by_error(allowable_size, sizes, level) for sizes in (reached.smallest, reached.quadratic)
+            )
+            return Allowed(smallest, quadratic, reached.binding)
         shape = self.declared.shape
         sizes, ends = np.full((len(limits), *shape), math.nan), np.zeros((len(limits), *shape), dtype=bool)
         reaching: list[Floats | None] = [None] * len(limits)
