@@ -84,6 +84,13 @@ class WithContent(NamedTuple):
     content: object
 
 
+SIZE_FIELD, BIAS_FIELD, LIMIT_FIELD, CONFIDENCE_FIELD = "sigma", "bias", "limit", "confidence"
+_WITH_BIAS = (
+    "position, velocity, acceleration and time_tag of a motion error, timing_error, propagation and the phases of "
+    "other_errors"
+)
+
+
 class Reader(Generic[T_co]):
     """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare.
 
@@ -139,6 +146,13 @@ class Quantity(Reader[float]):
     ) -> None:
         self.dimension = dimension
         self.bounds = (gt, ge, lt, le)
+
+    def read(self, value: object, path: KeyPath, report: Report) -> float | Invalid:
+        """Read a quantity; a section with a bias, which only some errors have, is refused with their names."""
+        if isinstance(value, dict) and BIAS_FIELD in value:
+            report(path, Problem("takes no bias", f"accepted: a size; {_WITH_BIAS} take one"))
+            return INVALID
+        return super().read(value, path, report)
 
     def leaf(self, value: object) -> float:
         """Read a number with its unit from a string, or accept a float in SI, and check it against the bounds."""
@@ -905,10 +919,6 @@ class _Pair(Section[SectionValue]):
         return {"$ref": f"#/definitions/{self.name}"}
 
 
-SIZE_FIELD, BIAS_FIELD = "sigma", "bias"
-LIMIT_FIELD, CONFIDENCE_FIELD = "limit", "confidence"
-
-
 class _SizeAndBias(_Pair):
     """The size of an error, and its bias, which is known, constant and signed.
 
@@ -946,12 +956,37 @@ class WithBias(OneOf[SectionValue]):
     def __init__(self, plain: "Quantity | Triple", name: str, bias: "Quantity | None" = None) -> None:
         keys = {
             SIZE_FIELD: Key(_without_sign(plain), "Size of the random part, as without a bias."),
-            BIAS_FIELD: Key(bias or plain, "The known, constant part, with its sign."),
+            BIAS_FIELD: Key(_with_unit(bias or plain), "The known, constant part, with its sign."),
         }
         # A position or velocity without a sigma may stand beside a covariance.
         unstated = None if isinstance(plain, Triple) else 0.0
         self.pair = _SizeAndBias(name, "Size of an error and its bias.", keys, unstated)
         super().__init__(lambda value: self.pair if isinstance(value, dict) else plain, (plain, self.pair))
+
+
+class _Bias(Quantity):
+    """A bias, which needs its unit, because a sigma beside it may be written in another one.
+
+    The class reads it like any quantity. A bias of zero, and a ratio, need no unit.
+    """
+
+    def leaf(self, value: object) -> float:
+        """Read a bias; a number without a unit is refused."""
+        number = super().leaf(value)
+        is_bare = isinstance(value, str) and not units.unit_behind(value)
+        if number and is_bare and self.dimension.si:
+            raise InvalidValueError("needs its unit", self.dimension.accepted.partition("; ")[0])
+        return number
+
+
+def _with_unit(reader: "Quantity | Triple") -> "Quantity | Triple":
+    """Reader of the same quantity that refuses a number without a unit."""
+    if isinstance(reader, Triple):
+        component = _with_unit(reader.component)
+        assert isinstance(component, Quantity)
+        return Triple(component, or_scalar=reader.or_scalar)
+    gt, ge, lt, le = reader.bounds
+    return _Bias(reader.dimension, gt=gt, ge=ge, lt=lt, le=le)
 
 
 def _without_sign(reader: "Quantity | Triple") -> "Quantity | Triple":
