@@ -14,13 +14,14 @@ velocity; a mission file calls it `ric`.
 
 import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from textwrap import wrap
 
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
-from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, MEASURED_KINDS
+from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, MEASURED_KINDS, STATE_KINDS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import (
@@ -60,7 +61,8 @@ class DeclaredMotionError:
 
     `position` [m], `velocity` [m/s] and `acceleration` [m/s²] have one sigma for each axis, or are None if not
     declared. `correlation` contains the correlations (6, 6) of position and velocity; it is empty if they are
-    uncorrelated. `distribution` is the name of the distribution, as written in a mission file.
+    uncorrelated. `distribution` is the name of the distribution, as written in a mission file, or the names for
+    position, velocity and acceleration. `biases` are the biases by the kind of error.
     """
 
     frame: str
@@ -68,7 +70,8 @@ class DeclaredMotionError:
     velocity: Vector | None
     correlation: tuple[tuple[float, ...], ...] = ()
     acceleration: Vector | None = None
-    distribution: str = "normal"
+    distribution: str | tuple[str, ...] = "normal"
+    biases: Mapping[str, Vector] = field(default_factory=dict)
 
     @property
     def is_isotropic(self) -> bool:
@@ -426,16 +429,19 @@ def _with_added(
         }
         if kind in without and statement == "not declared":
             declared_errors[owner] = without[kind]
-        elif kind == "distribution" and statement in ("uniform", "bound"):
-            declared_errors[owner] = replace(error, distribution=statement)
+        elif kind == "distribution":
+            names = tuple(statement.split())
+            declared_errors[owner] = replace(error, distribution=names if len(names) > 1 else statement)
         elif kind == "acceleration":
-            values = [float(number) for number in statement.split()[:3]]
-            declared_errors[owner] = replace(error, acceleration=(values[0], values[1], values[2]))
+            declared_errors[owner] = replace(error, acceleration=_three(statement))
+        elif kind in _BIASES:
+            name = kind.partition(".")[0]
+            declared_errors[owner] = replace(error, biases={**error.biases, name: _three(statement)})
         else:
             remarks.append(f"{key}: {statement}")
     for owner, error in declared_errors.items():
         if error is not None and error.position is None and error.velocity is None and error.acceleration is None:
-            declared_errors[owner] = None
+            declared_errors[owner] = None if not error.biases else error
     return declared_errors, remarks
 
 
@@ -610,6 +616,15 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
     return platform
 
 
+_BIASES = tuple(f"{kind.name}.bias" for kind in STATE_KINDS)  # of added parameters
+
+
+def _three(statement: str) -> Vector:
+    """First three numbers of an added parameter, as a vector."""
+    x, y, z = (float(number) for number in statement.split()[:3])
+    return x, y, z
+
+
 def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     tree: JsonObject = {"frame": error.frame}
     sigmas = {
@@ -630,7 +645,13 @@ def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
         tree |= sigmas
     if error.acceleration is not None:
         tree["acceleration"] = _triple(error.acceleration, ACCELERATION_KIND.unit)
-    if error.distribution != "normal":
+    for name, bias in error.biases.items():
+        unit = next(kind.unit for kind in STATE_KINDS if kind.name == name)
+        sigma = {"sigma": tree[name]} if name in tree else {}
+        tree[name] = {**sigma, "bias": _triple(bias, unit)}
+    if isinstance(error.distribution, tuple):
+        tree["distribution"] = dict(zip((kind.name for kind in STATE_KINDS), error.distribution, strict=True))
+    elif error.distribution != "normal":
         tree["distribution"] = error.distribution
     tree["source"] = f"{printable(imported.file)}, {imported.errors.at}, one sigma"
     return tree

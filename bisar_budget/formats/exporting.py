@@ -29,7 +29,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT_MPS
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
-from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, STATE_KINDS, StateKind
+from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, STATE_KINDS, TIME_TAG_KIND, StateKind
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
@@ -505,11 +505,22 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
             covariance[block, block] = np.diag(np.square(stated_sigmas))
         elif error.covariance is None and (common is None or getattr(common, kind.name) is None):
             added[f"{owner}.{kind.name}"] = "not declared"
+    turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
     if error.acceleration is not None:
-        turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
-        added[f"{owner}.acceleration"] = " ".join(f"{x:.12g}" for x in turn @ error.acceleration) + " m/s^2"
+        added[f"{owner}.acceleration"] = _numbers(turn @ error.acceleration, "m/s^2")
+    for kind in STATE_KINDS:
+        bias = error.bias_of(kind.name)
+        if bias is not None:
+            added[f"{owner}.{kind.name}.bias"] = _numbers(turn @ bias, kind.unit)
     if error.time_tag is not None:
         added[f"{owner}.time_tag"] = f"{error.time_tag:.12g} s"
+    for name, biases in ((owner, error.bias), ("common", {} if common is None else common.bias)):
+        if (bias := biases.get(TIME_TAG_KIND.name)) is not None:
+            added[f"{name}.time_tag.bias"] = f"{bias:.12g} s"
+    for kind in STATE_KINDS:
+        bias = None if common is None else common.bias_of(kind.name)
+        if common is not None and bias is not None:
+            added[f"common.{kind.name}.bias"] = f"{_numbers(np.array(bias), kind.unit)}, frame {common.frame}"
     if error.lever_arm is not None and error.lever_arm.uncertainty is not None:
         sizes = " ".join(f"{x:.12g}" for x in error.lever_arm.uncertainty)
         added[f"{owner}.lever_arm.uncertainty"] = f"{sizes} m"
@@ -533,6 +544,11 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
         added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
     turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)
     return turn_of_both @ covariance @ turn_of_both.T, "ECF"
+
+
+def _numbers(vector: Floats, unit: str) -> str:
+    """Components of a vector and their unit as text, for an added parameter."""
+    return f"{' '.join(f'{x:.12g}' for x in vector)} {unit}"
 
 
 def _along_scene(covariance: Floats, state: PlatformState, frame: str) -> Floats:
