@@ -14,7 +14,7 @@ from yaml import ScalarEvent
 from bisar_budget.faults import InvalidValueError, KeyPath, ParserEvent
 from bisar_budget.mission.changes import is_error
 from bisar_budget.mission.model import MISSION, UncertainFigure
-from bisar_budget.mission.readers import OneOf, Quantity, Reader, Triple
+from bisar_budget.mission.readers import BIAS_FIELD, OneOf, Quantity, Reader, Triple
 from bisar_budget.mission.tree import Content, Tree, has_uncertainty
 from bisar_budget.units import DB_PER_NEPER, LEVELS, POWER_RATIO, UNCERTAINTY_MARKS, parse_quantity, unit_behind
 
@@ -81,7 +81,8 @@ def _size_reader(reader: Reader[object] | None, path: KeyPath) -> Quantity | Non
         reader = reader.component
     while path and isinstance(path[-1], int):  # a component of a vector
         path = path[:-1]
-    is_size = is_error(".".join(map(str, path))) and "correlation" not in path
+    above_bias = path[: path.index(BIAS_FIELD)] if BIAS_FIELD in path else path
+    is_size = is_error(".".join(map(str, above_bias))) and "correlation" not in path
     return reader if isinstance(reader, Quantity) and is_size else None
 
 

@@ -356,13 +356,14 @@ ERROR_KEYS: dict[str, ErrorKey] = {
 # Keys that describe an error: which of them changes nothing that is computed is said beside it.
 _VELOCITY = {f"{ERROR}velocity": ["5 cm/s", 0, 0]}
 _SHARED = {f"{COMMON}velocity": ["5 cm/s", 0, 0]}
+_SHARED_MOVED = {f"{COMMON}position": ["1 m", 0, 0], f"{COMMON}acceleration": ["3 mm/s^2", 0, 0], **_SHARED}
 _MOVED_KINDS = ("position", "velocity", "acceleration")
 _MOVED = {f"{ERROR}position": ["1 m", 0, 0], f"{ERROR}acceleration": ["3 mm/s^2", 0, 0], **_VELOCITY}
 DESCRIBING_KEYS: dict[str, tuple[Document, Any, Any]] = {
     f"{ERROR}frame": (_VELOCITY, "track", None),
     f"{ERROR}distribution": (_VELOCITY, "uniform", None),
     **{f"{ERROR}distribution.{kind}": (_MOVED, "uniform", None) for kind in _MOVED_KINDS},
-    **{f"{COMMON}distribution.{kind}": (_SHARED, "uniform", None) for kind in _MOVED_KINDS},
+    **{f"{COMMON}distribution.{kind}": (_SHARED_MOVED, "uniform", None) for kind in _MOVED_KINDS},
     f"{ERROR}source": (_VELOCITY, "report", None),
     f"{ERROR}random.name": ({f"{ERROR}random.0": {"sigma": "3 mm", "correlation_time": "1.5 s"}}, "GNSS", "RTK"),
     f"{ERROR}random.source": (
@@ -409,9 +410,9 @@ for _key, _small in (
     *((f"other_errors.{_phase}", "0.1 deg") for _phase in ("quadratic_phase_error", "cubic_phase_error")),
 ):
     _alone = ERROR_KEYS[_key]
-    ERROR_KEYS[f"{_key}.sigma"] = _alone._replace(absent=_key)
+    ERROR_KEYS[f"{_key}.sigma"] = _alone._replace(absent=_alone.absent or path_of(_key))
     ERROR_KEYS[f"{_key}.bias"] = _alone._replace(
-        beside={**_alone.beside, f"{path_of(_key)}.sigma": _small}, absent=f"{_key}.bias"
+        beside={**_alone.beside, f"{path_of(_key)}.sigma": _small}, absent=path_of(f"{_key}.bias")
     )
 
 

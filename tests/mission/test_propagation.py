@@ -49,7 +49,8 @@ def faults(**changes: object) -> tuple[Fault, ...]:
 def test_both_legs_alike_or_each_its_own(propagation: dict[str, object], legs: list[tuple | None]) -> None:
     found = parse_mission(mission_text(propagation=propagation)).propagation
     assert found is not None
-    assert [found.leg(name) for name in ("transmitter", "receiver")] == legs
+    of_legs = map(found.leg, ("transmitter", "receiver"))
+    assert [None if leg is None else leg[:4] for leg in of_legs] == legs
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tests.conftest import mission_text
 
 COLUMNS = [
     *("id", "text", "key", "limit", "status", "reached", "use", "decided_by"),
-    *("file", "finding", "overrides"),
+    *("file", "finding", "overrides", "confidence"),
 ]
 REQUIREMENTS = """id,text,key,limit,owner
 SYS-042,"The image, as a whole, shall be located within 1 mm.",location_error,1.0 mm,A

@@ -238,7 +238,7 @@ def test_several_missions_have_one_each(run, tmp_path: Path) -> None:
         (("--sweep", f"{TIME}=1,2s", "--format", "json"), "--sweep is shown in a compliance report"),
         (
             ("--sweep", f"{TIME}=1,2s", "--explain", "x"),
-            "with --format, --report, --monte-carlo, --scheduler or --sweep",
+            "with --format, --report, --monte-carlo, --guard, --scheduler or --sweep",
         ),
         (("--sweep", f"{TIME}=1s", "R"), "has one value; accepted: several. --set puts in one"),
         (("--sweep", f"{TIME}", "R"), f"--sweep {TIME}: does not say which values"),

@@ -9,9 +9,9 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.totals import IsMember, Totals
 from bisar_budget.arrays import Floats
-from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC, Model
+from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
-from bisar_budget.effects.error_quantiles import judged_size, quantile_factor
+from bisar_budget.effects.error_quantiles import allowable_size, judged_size, quantile_factor
 from bisar_budget.effects.sources import distribution_of
 from bisar_budget.findings.row import Row
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
@@ -66,6 +66,10 @@ class SizeRule:
     def judged(self, size: float) -> float:
         """Judged size of an error of the declared size `size`."""
         return float(judged_size(self.distribution, size, self.bias, self.confidence))
+
+    def allowable(self, reached: float) -> float:
+        """Largest declared size of an error whose judged size is at most `reached`."""
+        return float(allowable_size(self.distribution, reached, self.bias, self.confidence))
 
     def judged_line(self, symbol: str, size: float) -> list[str]:
         """Lines that compute the judged size from the declared size."""
@@ -142,14 +146,6 @@ def judged_steps(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
             yield step(title, *rule.judged_line(f"judged_{_SYMBOLS[requirement]}", abs(source.declared)))
 
 
-def reaching_size(model: Model, source: ErrorSource, requirement: str, limit: float) -> float | None:
-    """Size of an error of either sign at which its effect reaches a limit; None if no size reaches it."""
-    block, index = model.errors.block_of(source)
-    limits = [np.full(block.declared.shape, limit) if name == requirement else None for name in LIMITING_REQUIREMENTS]
-    size = plain(block.reaching(model.name, limits, is_complete=False).smallest[index])
-    return None if math.isnan(size) else size
-
-
 def biased_use(analysis: Analysis, source: ErrorSource, row: Row) -> Step:
     """Step for the utilization of an error with a bias, from the sizes that reach the limits."""
     size, terms, required = abs(source.declared or 0.0), list[str](), analysis.mission.requirements
@@ -158,7 +154,7 @@ def biased_use(analysis: Analysis, source: ErrorSource, row: Row) -> Step:
         limit = getattr(required, requirement)
         if requirement == QUADRATIC:
             limit = analysis.allocation.qpe_allowed(source.owner)
-        reached = reaching_size(model, source, requirement, float(limit))
+        reached = model.allowable(source, requirement, float(limit))
         if reached is not None:
             terms.append(f"{number(rule.judged(size))}/{number(reached)}")
     text = f"max({', '.join(terms)})" if len(terms) > 1 else terms[0]

@@ -53,7 +53,6 @@ from bisar_budget.report.explain.explained_confidence import (
     SizeRule,
     biased_use,
     judged_steps,
-    reaching_size,
     rules_of,
     total_steps,
 )
@@ -222,7 +221,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     rules = rules_of(analysis, source)
     if by_quadratic is not None:
         rule = rules[QUADRATIC]
-        reached = by_quadratic if rule.is_plain else reaching_size(model, source, QUADRATIC, limit)
+        reached = by_quadratic if rule.is_plain else model.allowable(source, QUADRATIC, limit)
         if reached is None or model.ends_image(source, reached):
             sizes["by_image"] = by_quadratic
         else:
@@ -236,13 +235,14 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     ):
         if required is None or not source.is_motion:
             continue
-        size, rule = model.allowable(source, name, required), rules[name]
-        if name == row.binding_requirement:
-            size = row.allowable  # the search of the check may differ in the last digits
-        if size is None:
+        reached, rule = model.allowable(source, name, required), rules[name]
+        if reached is None:
             continue
-        reached = size if rule.is_plain else reaching_size(model, source, name, required)
-        if reached is None or model.ends_image(source, reached):
+        size = rule.allowable(reached)
+        if name == row.binding_requirement and row.allowable is not None:
+            size = row.allowable  # the search of the check may differ in the last digits
+            reached = size if rule.is_plain else reached
+        if model.ends_image(source, reached):
             sizes["by_image"] = size
             continue
         sizes[symbol] = size
