@@ -34,7 +34,7 @@ from bisar_budget.report.words.sentences import (
 from bisar_budget.units import format_in, format_quantity
 
 _MAX_LARGEST_ROWS = 6  # contributions in each table of a summary
-_MAX_MATRIX_ROWS = 18  # rows in a summary; the annex has the other rows, with smaller utilizations
+_MAX_MATRIX_ROWS = 16  # rows in a summary; the annex has the other rows, with smaller utilizations
 _MAX_BRIEF_ROWS = 6  # rows in the summary of one of several missions
 
 
