@@ -100,6 +100,11 @@ class RandomVector(NamedTuple):
         normal = (ways * np.sqrt(np.maximum(squares, 0.0))).T
         return cls(nothing.sum(axis=0), normal, nothing, nothing, np.zeros((0, 2, len(covariance))))
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether all contributions are finite; otherwise the length has no distribution."""
+        return all(bool(np.isfinite(vectors).all()) for vectors in self)
+
     def along(self, way: Floats) -> "RandomVector":
         """Component of the vector along a unit vector (m,), as a random vector of one component."""
         return RandomVector(*(vectors @ way[:, None] for vectors in self))

@@ -17,10 +17,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from bisar_budget.analysis.spread import CUBIC_POWER, SpreadPhase, Tone
-from bisar_budget.analysis.together import Together
-from bisar_budget.arrays import Floats
+from bisar_budget.analysis.together import BIAS_SUFFIX, Together
+from bisar_budget.arrays import Floats, PerCase
 from bisar_budget.effects.combined import combined
-from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.declared import Declared, DeclaredErrors
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.image_plane import FINEST_NODES, SIGHT_POLYNOMIAL_COUNT, nodes
 from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges
@@ -50,9 +50,9 @@ def peak_loss_db(
         Tones that make paired echoes.
     """
     losses = _losses_of_motion(errors, together)
-    of_motion = {error.subject.id for error in together.motion}
+    of_motion = {error.subject.id + suffix for error in together.motion for suffix in ("", BIAS_SUFFIX)}
     variances: dict[str, Floats] = {}
-    for phase in together.phases:
+    for phase in (*together.phases, *together.biases):
         if phase.row_id not in of_motion:
             cubic = 0.0 if phase.cubic_rad is None else np.where(errors.exact.is_turned, 0.0, phase.cubic_rad)
             variance = (phase.judged(1.0) / QUADRATIC_OF_VARIANCE) ** 2 + CUBIC_POWER * cubic**2
@@ -78,24 +78,40 @@ def _losses_of_motion(errors: DeclaredErrors, together: Together) -> list[Floats
     motion = together.motion
     if not motion:
         return []
-    remaining = _range_errors_left(errors, motion)
+    does = [errors.does("full", error) for error in motion]
+    remaining = _range_errors_left(errors, motion, does, [error.declared for error in motion])
     index_by_id = {error.subject.id: index for index, error in enumerate(motion)}
     losses = dict(zip(index_by_id, peak_losses(errors.exact, remaining).max(axis=1), strict=True))
     for group in together.groups if together.rule == "rss" else ():
         if index_by_id.keys() >= set(group.ids):
             independent = together.independent(group, remaining[[index_by_id[row_id] for row_id in group.ids], 0])
             losses |= dict(zip(group.ids, peak_losses(errors.exact, independent), strict=True))
-    return list(losses.values())
+    return [*losses.values(), *_losses_of_biases(errors, motion)]
 
 
-def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) -> Floats:
+def _losses_of_biases(errors: DeclaredErrors, motion: Sequence[ErrorSource]) -> list[Floats]:
+    """List the peak loss due to the bias of each motion or clock error that has one, (cases,). [dB]
+
+    The mean loss due to a bias and a random part is the sum of their losses.
+    """
+    biased = [error for error in motion if np.any(error.bias)]
+    if not biased:
+        return []
+    does = [errors.of_bias("full", error) for error in biased]
+    remaining = _range_errors_left(errors, biased, does, [error.bias for error in biased])
+    return list(peak_losses(errors.exact, remaining[:, 0]))
+
+
+def _range_errors_left(
+    errors: DeclaredErrors, motion: Sequence[ErrorSource], does: Sequence[Declared], sizes: Sequence[PerCase | None]
+) -> Floats:
     """Range errors over the aperture that remain at the image point of each error. [m]
 
     The result is (errors, signs, nodes, cases). The image point is the ground point to which an error displaces the
-    image. The errors have their declared sizes. The first of the two signs is the declared sign."""
-    does = [errors.does("full", error) for error in motion]
+    image. The errors have the given sizes, and `does` are their effects. The first of the two signs is that of the
+    size."""
     east, north = np.moveaxis(np.array([(effect.displacement, effect.opposite) for effect in does]), 2, 0)
-    size = np.array([errors.array(error.declared) for error in motion])
+    size = np.array([errors.array(size) for size in sizes])
     lanes = errors.lanes(*motion, signs=(1.0, -1.0))
     remaining = errors.exact.left_over(
         lanes, np.repeat(size[:, None], 2, axis=1).ravel(), (east.ravel(), north.ravel())

@@ -6,6 +6,7 @@ clock.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from bisar_budget.effects.random_effect import RandomEffect, RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Shares
+
+BIAS_SUFFIX = ".bias"  # behind the row id of an error, for the part of a sum that its bias makes
 
 
 class Together:
@@ -140,6 +143,42 @@ class Together:
         other rules combine the sizes that the requirements judge, each with its bias and confidence.
         """
         return (self.errors.does if self.rule == "rss" else self.errors.judged)(self.model, error)
+
+    @cached_property
+    def biases(self) -> list[DeclaredPhase]:
+        """Phases of the biases of the declared errors, with their signs.
+
+        The list is empty under rules other than root-sum-square. The phases of the errors include biases there.
+        """
+        return [
+            DeclaredPhase(row_id + BIAS_SUFFIX, owner, qpe, cubic, 1.0)._replace(hidden_rad=hidden)
+            for row_id, owner, qpe, cubic, hidden, _ in self._effects_of_biases()
+        ]
+
+    @cached_property
+    def moves_of_biases(self) -> Moves:
+        """Displacements of the image due to the biases of the declared errors; see `biases`. [m]"""
+        return [(row_id + BIAS_SUFFIX, moved) for row_id, *_, moved in self._effects_of_biases() if moved is not None]
+
+    def _effects_of_biases(self) -> Iterator[tuple[Any, ...]]:
+        """Yield row id, owner, quadratic, cubic and hidden phase, and displacement of each bias."""
+        if self.rule != "rss":
+            return
+        for error in self.errors.stated:
+            if np.any(error.bias):
+                does = self.errors.of_bias(self.model, error)
+                is_motion = error.is_motion
+                yield (
+                    *(error.subject.id, error.subject.owner),
+                    *(does.qpe, does.cubic if is_motion else None, does.hidden),
+                    does.displacement if is_motion else None,
+                )
+        for random in self.random:
+            if random.biased is not None:
+                effects = random.biased.signed(self.model)
+                hidden = np.sqrt(np.square(effects[4:]).sum(axis=0))
+                quadratic, cubic, east, north, hidden = map(self.errors.array, (*effects[:4], hidden))
+                yield random.subject.id, random.subject.owner, quadratic, cubic, hidden, (east, north)
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """List the phases of the declared errors that count against an owner's share of the budget.
@@ -315,6 +354,10 @@ class Together:
         named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
         combined_parts = [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in named_moves]
         return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
+
+    def biases_of_case(self, case: int = 0) -> list[tuple[str, GroundVector]]:
+        """List the displacements of the image due to biases in one case, as pairs of id and (east, north). [m]"""
+        return [(row_id, (plain(east, case), plain(north, case))) for row_id, (east, north) in self.moves_of_biases]
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:

@@ -106,14 +106,17 @@ class Totals:
         """Size that a requirement judges for the sum of the errors of some owners, (cases,), in its unit.
 
         The parameters are those of `vector`. `root_sum_square` (cases,) is the size without biases and a confidence.
-        The result is infinite or NaN in the cases in which this size is, because an error leaves no image.
+        The result is infinite or NaN in the cases in which an error leaves no image, at its declared size, at the
+        size that the requirement judges, or as a bias.
         """
         if not self.is_asked(requirement):
             return root_sum_square
         confidence, reached = self.errors.confidence(requirement), np.array(root_sum_square, dtype=float)
         for case in np.flatnonzero(np.isfinite(reached)):
             vector = self.vector(model, requirement, is_member, int(case), gain)
-            if confidence is None:
+            if not vector.is_finite:
+                reached[case] = math.nan
+            elif confidence is None:
                 reached[case] += np.linalg.norm(vector.mean)
             else:
                 (reached[case],) = vector.quantiles((confidence,))
@@ -197,7 +200,10 @@ class Totals:
         return tuple(effects.tolist())
 
     def _scale(self, model: str, requirement: str, variable: Variable, case: int, gain: PerCase) -> float:
-        """Ratio of the exact effect of an error at its judged size to its first-order effect; 1 for small errors."""
+        """Ratio of the exact effect of an error at its judged size to its first-order effect; 1 for small errors.
+
+        The result is NaN if an error of this size leaves no image.
+        """
         if model == "published" or len(variable.parts) != 1:
             return 1.0
         ((source, _),) = variable.parts
@@ -211,10 +217,10 @@ class Totals:
         if requirement == QUADRATIC:  # with this gain, not with that of the mission
             hidden = plain(gain, case) * plain(block.hidden_per_unit[0, index], case)
             per_unit = math.hypot(plain(block.effects["full"].qpe[index], case), hidden)
-        moved = 0.0 if exact.farthest is None else math.hypot(*exact.farthest)
+        moved = math.nan if exact.farthest is None else math.hypot(*exact.farthest)
         effect = {QUADRATIC: exact.judged(plain(gain, case)), CUBIC: abs(exact.cubic), LOCATION: moved}[requirement]
         first_order = per_unit * size
-        return float(effect / first_order) if first_order and math.isfinite(effect) else 1.0
+        return float(effect / first_order) if first_order else 1.0
 
 
 def _hidden_count(variables: Sequence[Variable], gain: float) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
-from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.analysis.together import BIAS_SUFFIX, Together, cubics, quadratics
 from bisar_budget.analysis.totals import Totals
 from bisar_budget.arrays import Booleans, Floats, PerCase, PerCaseFlag
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
@@ -96,6 +96,7 @@ class Aggregates:
             qpe_published_rad=self.together("published").combined(quadratics(published)),
             qpe_full_rad=np.where(np.isfinite(of_full), of_full, math.nan),
             root_sum_square=root_sum_square,
+            biases=[(bias.row_id, bias.judged(gain)) for bias in mine.biases if split.includes(bias.owner, owner)],
         )
         if mine.model != "full":
             of_full_model = self._reached(theirs, QUADRATIC, theirs.judged(full, gain=1.0), owner)
@@ -157,6 +158,7 @@ class Aggregates:
             metric=CUBIC,
             cubic_rad=size,
             root_sum_square=root_sum_square,
+            biases=cubics(mine.biases),
         )
 
     def _location(self, mine: Together, theirs: Together) -> "Aggregate":
@@ -181,7 +183,7 @@ class Aggregates:
         )
 
     def _pull_in(self, mine: Together, theirs: Together) -> "Aggregate":
-        phases, pull_in = quadratics(mine.phases), math.pi * np.asarray(self.allocation.n_pull)
+        phases, pull_in = quadratics([*mine.phases, *mine.biases]), math.pi * np.asarray(self.allocation.n_pull)
         return self._row(
             subject("mission", PULL_IN),
             self._is_declared(mine.phases),
@@ -189,7 +191,7 @@ class Aggregates:
             mine.combined(phases, "sum"),
             pull_in,
             theirs,
-            theirs.combined(quadratics(theirs.phases), "sum"),
+            theirs.combined(quadratics([*theirs.phases, *theirs.biases]), "sum"),
             never_fails=True,
         )
 
@@ -223,6 +225,7 @@ class Aggregates:
         never_fails: bool = False,
         continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         root_sum_square: Floats | None = None,
+        biases: Phases = (),
         **fields: Any,
     ) -> "Aggregate":
         """Judge a sum of errors against a limit, for an array of cases.
@@ -232,7 +235,7 @@ class Aggregates:
         `continued` is a pair: the kind of effect that the row sums, and the random errors in the sum. A pass becomes
         a warning if it depends on phase noise at frequencies below the first point of a phase-noise mask. A pass that
         depends on doubtful oscillator noise becomes `not_evaluated`. `root_sum_square` is the sum at one sigma, if it
-        differs from `size`; the noise of the masks is a part of it.
+        differs from `size`; the noise of the masks is a part of it. `biases` are phases that add to `phases`.
         """
         rests_on: PerCaseFlag = False
         is_in_doubt: PerCaseFlag = False
@@ -268,7 +271,7 @@ class Aggregates:
             judged = judged.where(~has_value, nothing)
         rule = "sum" if never_fails else self.combine
         doubts = (size_by_theirs, of_all, is_over_by_other, is_over_of_all)
-        return Aggregate(judged, rule, phases, *doubts, without_autofocus, rests_on, continued, is_in_doubt)
+        return Aggregate(judged, rule, phases, *doubts, without_autofocus, rests_on, continued, is_in_doubt, biases)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -291,6 +294,7 @@ class Aggregate(FamilyRow):
     rests_on: PerCaseFlag = False  # result depends on noise below the first points of masks
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
     is_in_doubt: PerCaseFlag = False  # result depends on doubtful noise
+    biases: Phases = ()  # of the errors in `phases`
 
     def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
         """Return the row with the equal-loss phase as its declared value, instead of the judged phase.
@@ -356,10 +360,16 @@ class Aggregate(FamilyRow):
         N_pull is the pull-in range of autofocus in units of π rad. If no autofocus could make the sum pass, the note
         reports this instead.
         """
-        together, owner = case.analysis.together(model), self.judged.subject.owner
-        members = together.owed(case.allocation.qpe, owner)
-        quadratic = case.number(together.combined(quadratics(members)))
-        hidden = math.sqrt(max(case.number(together.judged(members, gain=1.0)) ** 2 - quadratic**2, 0.0))
+        together, owner, split = case.analysis.together(model), self.judged.subject.owner, case.allocation.qpe
+        members, totals = together.owed(split, owner), Totals(case.analysis)
+        quadratic, total = together.combined(quadratics(members)), together.judged(members, gain=1.0)
+        if together.rule == "rss":
+            quadratic, total = (
+                totals.reached(model, QUADRATIC, lambda name: split.includes(name, owner), size, gain)
+                for size, gain in ((quadratic, 0.0), (total, 1.0))
+            )
+        quadratic = case.number(quadratic)
+        hidden = math.sqrt(max(case.number(total) ** 2 - quadratic**2, 0.0))
         return case.allocation.passes_with(quadratic, hidden, owner, case.mission)
 
 
@@ -367,12 +377,12 @@ class Aggregate(FamilyRow):
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
     """Compute the cubic, spread and tone phases of each declared error with one model. [rad]
 
-    The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread energy over the image,
+    The phase of a bias is an item of its own. The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread energy over the image,
     and `tone` for the peak phases of tones. Each value is a list of pairs (row id, phase).
     """
     array, together = analysis.errors.array, analysis.together(model)
     return {
-        "cubic": cubics(together.phases),
+        "cubic": cubics([*together.phases, *together.biases]),
         "spread": [
             (phase.row_id, np.sqrt(np.nan_to_num(array(phase.variance))))
             for phase in (*analysis.noise[model], *analysis.rests[model])
@@ -401,7 +411,8 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
         sizes: dict[str, Floats] = {}
         for together, parts in by_model:
             sum_of_all = np.fmax(sum_of_all, together.combined(parts[effect_name], together.rule_of_all))
-            for row_id, size in parts[effect_name]:
+            for part_id, size in parts[effect_name]:
+                row_id = part_id.removesuffix(BIAS_SUFFIX)
                 sizes[row_id] = np.fmax(sizes.get(row_id, 0.0), np.abs(size))
         if not sizes:
             continue
@@ -490,9 +501,10 @@ def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, 
     together, row_subject = case.analysis.together(model), aggregate.judged.subject
     wording = _wording_of(row_subject, aggregate.rule)
     if wording.is_displacement:
-        sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
+        moves = [*together.displacement_parts(case.place), *together.biases_of_case(case.place)]
+        sizes = [(row_id, math.hypot(*move)) for row_id, move in moves]
     else:
-        sizes = together.phase_parts(aggregate.phases, aggregate.rule, case.place)
+        sizes = together.phase_parts([*aggregate.phases, *aggregate.biases], aggregate.rule, case.place)
     row_id, largest = sizes[int(first_highest(np.abs([size for _, size in sizes])))]
     if wording.is_displacement or row_subject.facts.only_warns:
         return row_id, largest, NOTHING

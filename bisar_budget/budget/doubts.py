@@ -511,8 +511,8 @@ def _is_apart(row: Row) -> bool:
 def _difference(row: Row) -> float:
     """Absolute difference between the utilizations of a row in the published model and in the full model."""
     declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
-    published, full = (0.0 if limit is None else declared / limit for limit in limits)
-    return abs(published - full)
+    published, full = (0.0 if limit is None else declared / limit if limit else math.inf for limit in limits)
+    return 0.0 if published == full else abs(published - full)
 
 
 # ---------------------------------------------------------------------- the collection

@@ -216,18 +216,23 @@ def _entry(
         confidence=mission.requirements.confidence_of(key),
     )
     is_distributed = not is_open and key in LIMITING_REQUIREMENTS
-    return _with_distribution(requirement, judged, case) if is_distributed else requirement
+    if not is_distributed:
+        return requirement
+    models = [row.model for row in rows if row and row.id == f"mission.{key}" and row.model in judged.families]
+    return _with_distribution(requirement, judged, case, (models or list(judged.families))[0])
 
 
-def _with_distribution(requirement: JudgedRequirement, judged: JudgedMission, case: Case) -> JudgedRequirement:
+def _with_distribution(
+    requirement: JudgedRequirement, judged: JudgedMission, case: Case, model: str
+) -> JudgedRequirement:
     """Add the distribution of the quantity that a requirement limits to the requirement.
 
-    It is the distribution by the gating model, of all declared errors together, whatever the mission's rule. The
-    requirement is returned unchanged if no image forms with an error of the declared size, or if no error is
-    declared. The percentiles of a quadratic phase are those before autofocus, and its probability is that with
+    It is the distribution by the model that judges the sum of the errors, of all declared errors together, whatever
+    the mission's rule. The requirement is returned unchanged if no image forms with a declared error, or if no error
+    is declared. The percentiles of a quadratic phase are those before autofocus, and its probability is that with
     autofocus.
     """
-    key, model, totals = requirement.key, next(iter(judged.families)), judged.totals
+    key, totals = requirement.key, judged.totals
     together = judged.analysis.together(model)
     if not (together.phases or together.is_placed):
         return requirement
@@ -235,6 +240,8 @@ def _with_distribution(requirement: JudgedRequirement, judged: JudgedMission, ca
     if not math.isfinite(case.number(of_all)):
         return requirement
     vector, limit = totals.of_all(model, key, case.place), getattr(case.mission.requirements, key)
+    if not vector.is_finite:
+        return requirement
     requirement = requirement._replace(percentiles=_percentiles(vector))
     if limit is not None:
         gain = case.allocation.autofocus_gain if key == QUADRATIC else 1.0

@@ -863,6 +863,11 @@ class DeclaredErrors:
         factor = self.mission.allocation.coverage_factor if error.is_covered else 1.0
         return block.does(model, np.hypot(block.declared / factor, block.bias)).of(index)
 
+    def of_bias(self, model: str, error: ErrorSource) -> Declared:
+        """Effects of the bias of a declared error alone according to a model, in arrays (cases,)."""
+        block, index = self.block_of(error)
+        return block.does(model, block.bias).of(index)
+
     def confidence(self, requirement: str) -> float | None:
         """Probability with which a requirement has to be kept; None if the file states no confidence for it."""
         return self.mission.requirements.confidence_of(requirement)

@@ -167,9 +167,13 @@ class BiasEffects(NamedTuple):
         )
         return BiasEffects(plain(self.bias, case), published[:, None], full[:, None])
 
+    def signed(self, model: str) -> Floats:
+        """Effects of the bias in a model, in the order of `published` or `full`: phases [rad], displacements [m]."""
+        return np.asarray(self.bias * (self.full if model == "full" else self.published))
+
     def sizes(self, model: str, gain: PerCase) -> tuple[Floats, Floats, Floats]:
         """Magnitudes of judged phase, cubic phase and displacement due to the bias; see `Declared.judged`."""
-        effects = self.bias * (self.full if model == "full" else self.published)
+        effects = self.signed(model)
         judged = np.sqrt(effects[0] ** 2 + gain**2 * np.square(effects[4:]).sum(axis=0))
         return judged, np.abs(effects[1]), np.hypot(effects[2], effects[3])
 
