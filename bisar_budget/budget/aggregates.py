@@ -362,14 +362,16 @@ class Aggregate(FamilyRow):
         """
         together, owner, split = case.analysis.together(model), self.judged.subject.owner, case.allocation.qpe
         members, totals = together.owed(split, owner), Totals(case.analysis)
-        quadratic, total = together.combined(quadratics(members)), together.judged(members, gain=1.0)
-        if together.rule == "rss":
-            quadratic, total = (
-                totals.reached(model, QUADRATIC, lambda name: split.includes(name, owner), size, gain)
-                for size, gain in ((quadratic, 0.0), (total, 1.0))
-            )
-        quadratic = case.number(quadratic)
-        hidden = math.sqrt(max(case.number(total) ** 2 - quadratic**2, 0.0))
+
+        def reached(size: Floats, gain: float) -> float:
+            if together.rule == "rss":
+                size = totals.reached(model, QUADRATIC, lambda name: split.includes(name, owner), size, gain)
+            return case.number(size)
+
+        quadratic = reached(together.combined(quadratics(members)), 0.0)
+        gain = max(quadratic / case.allocation.qpe_limit(owner), 1.0)  # at this gain the hidden phase counts
+        total = reached(together.judged(members, gain=gain), gain)
+        hidden = math.sqrt(max(total**2 - quadratic**2, 0.0)) / gain
         return case.allocation.passes_with(quadratic, hidden, owner, case.mission)
 
 

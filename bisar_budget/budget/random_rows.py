@@ -207,8 +207,20 @@ class RandomRows:
                 for row, size in zip(rows, of_random_part, strict=True):
                     sizes[row, index] = size
                 spread = sizes[RANDOM_REQUIREMENTS.index(ISLR), index]
-                uses[index] = np.maximum(uses[index], declared[index] / spread)
+                by_bias = self._spread_use_of_bias(
+                    error, model, None if limits.spread is None else limits.spread[index]
+                )
+                uses[index] = np.maximum(uses[index], np.hypot(declared[index] / spread, by_bias))
+                spread[by_bias >= 1] = 0.0
+                spread *= np.sqrt(np.maximum(1 - by_bias**2, 0.0))
         return uses
+
+    def _spread_use_of_bias(self, error: RandomError, model: str, limit: Floats | None) -> Floats:
+        """Fraction of the limit on the rms phase that the cubic phase of an error's bias uses, (cases,)."""
+        if limit is None or error.biased is None or self.mission.requirements.cubic_phase_error is not None:
+            return np.zeros(self.judging.cases)
+        _, cubic, _ = error.biased.sizes(model, 1.0)
+        return np.asarray(self.judging.array(math.sqrt(CUBIC_POWER) * cubic / limit))
 
     def rows(self, model: str) -> Iterator["RandomRow"]:
         """Yield the rows of all random errors, declared or not, as judged by the model `published` or `full`."""

@@ -218,8 +218,8 @@ def _entry(
     is_distributed = not is_open and key in LIMITING_REQUIREMENTS
     if not is_distributed:
         return requirement
-    models = [row.model for row in rows if row and row.id == f"mission.{key}" and row.model in judged.families]
-    return _with_distribution(requirement, judged, case, (models or list(judged.families))[0])
+    model = next((row.model for row in rows if row and row.id == f"mission.{key}" and row.model), "")
+    return _with_distribution(requirement, judged, case, model or next(iter(judged.families)))
 
 
 def _with_distribution(
