@@ -379,8 +379,9 @@ class Aggregate(FamilyRow):
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
     """Compute the cubic, spread and tone phases of each declared error with one model. [rad]
 
-    The phase of a bias is an item of its own. The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread energy over the image,
-    and `tone` for the peak phases of tones. Each value is a list of pairs (row id, phase).
+    The result has three keys: `cubic` for cubic phases, `spread` for rms phases that spread energy over the image,
+    and `tone` for the peak phases of tones. Each value is a list of pairs (row id, phase). The cubic phase of a bias
+    is an item of its own.
     """
     array, together = analysis.errors.array, analysis.together(model)
     return {
