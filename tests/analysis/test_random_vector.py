@@ -340,7 +340,9 @@ class TestSymmetries:
         case = mixed(2, (counts[0] + 1, *counts[1:]), float(seed % 2), seed)
         turn = np.array([(math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))])
         turned = RandomVector(*(rows @ turn for rows in case))
-        assert turned.quantiles(PERCENTILES) == pytest.approx(case.quantiles(PERCENTILES), rel=1e-3)
+        # Lattices of both are within 5e-4 of a probability, see the module.
+        found = [turned.probability(length) for length in case.quantiles(PERCENTILES)]
+        assert found == pytest.approx(PERCENTILES, abs=1e-3)
 
     @settings(max_examples=40, deadline=None)
     @given(st.integers(1, 4), COUNTS, SEEDS)

@@ -83,7 +83,7 @@ LEFT = {
     "questions/allocate.py": (1, "the last part of a key of the file, which is the name of a kind"),
     "questions/specified.py": (1, "sorts of parts"),
     "questions/varied.py": (3, "keys of an oscillator, and classes of sections"),
-    "formats/collected.py": (4, "words of parameters of a CPHD file"),
+    "formats/collected.py": (6, "words of parameters of a CPHD file"),
     "mission/covariance.py": (1, "words in the names of correlated errors"),
     "mission/platforms.py": (1, "keys of the file that a covariance replaces"),
     "mission/quantities.py": (3, "steps of a path of keys"),
