@@ -21,6 +21,8 @@ from textwrap import wrap
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT_MPS
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
 from bisar_budget.error_kinds.path_kinds import ACCELERATION_KIND, MEASURED_KINDS, STATE_KINDS
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
@@ -49,6 +51,12 @@ _MAX_PATH_ORDER = 4  # of a path that a mission states: up to the snap
 _FIT_TOLERANCE_FRACTION = 1e-3  # of a wavelength: 0.4° of phase, a hundredth of the usual budget of 45°
 _ROUNDING_M = 1e-7  # a term that moves the path by less at the end of the aperture is rounding
 _BETTER_FIT_FRACTION = 0.9  # of the residual; an order with a larger residual fits noise
+
+
+# Added parameters that become keys of a mission, of a platform and of the clock error.
+_BIASES = tuple(f"{kind.name}.bias" for kind in STATE_KINDS)
+_READ_OF_PLATFORMS = ("position", "velocity", "acceleration", "distribution", *_BIASES)
+_READ_OF_TIMING = ("quadratic", "cubic", *(f"{term}.bias" for term in TIMING_KIND.sizes))
 
 
 class NoPathError(ValueError):
@@ -96,8 +104,10 @@ class FileErrors:
     """Errors that a radar file declares: motion errors of each platform or of both in common, and clock errors.
 
     `timing_constant` is the standard deviation of the delay [s]. `timing_linear` is the standard deviation of the
-    relative difference of the clock frequencies. `remarks` explain how the errors were converted, and what could not
-    be expressed with the keys of a mission. `at` is the XML path of the errors.
+    relative difference of the clock frequencies. `timing_added` contains the figures of the clock error that are in
+    added parameters: sizes by `quadratic` and `cubic`, and biases by `constant.bias` and so on. `remarks` explain how
+    the errors were converted, and what could not be expressed with the keys of a mission. `at` is the XML path of the
+    errors.
     """
 
     transmitter: DeclaredMotionError | None = None
@@ -107,6 +117,7 @@ class FileErrors:
     timing_linear: float | None = None
     at: str = ""
     remarks: tuple[str, ...] = ()
+    timing_added: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -389,7 +400,7 @@ def _of_bistatic(bistatic: Element, seen: Seen) -> FileErrors:
                 if sensor.maybe(key) is not None:
                     sigmas.append(sensor.number(key))
     clocks, delays = values.values()
-    declared_errors, added_remarks = _with_added(bistatic, declared_errors)
+    declared_errors, timing_added, added_remarks = _with_added(bistatic, declared_errors)
     if clocks:
         remarks.append(
             "timing_error.linear is the root sum square of ClockFreqSF of both platforms: a receiver whose clock is "
@@ -402,47 +413,88 @@ def _of_bistatic(bistatic: Element, seen: Seen) -> FileErrors:
         receiver=declared_errors["receiver"],
         timing_constant=math.hypot(*delays) if delays else None,
         timing_linear=math.hypot(*clocks) if clocks else None,
+        timing_added=timing_added,
         at=bistatic.path,
         remarks=tuple(remarks + added_remarks),
     )
 
 
+def is_read_back(key: str) -> bool:
+    """Whether an added parameter that this program writes becomes a key of the imported mission, and no comment."""
+    owner, _, kind = key.partition(".")
+    return kind in (_READ_OF_TIMING if owner == "timing" else _READ_OF_PLATFORMS if owner in PLATFORMS else ())
+
+
 def _with_added(
     bistatic: Element, declared_errors: dict[str, DeclaredMotionError | None]
-) -> tuple[dict[str, DeclaredMotionError | None], list[str]]:
+) -> tuple[dict[str, DeclaredMotionError | None], dict[str, float], list[str]]:
     """Complete the errors with the parameters that this program writes to `AddedParameters` of a CPHD file.
 
-    The parameters state accelerations, distributions, and which sigmas of the file are placeholders for errors that
-    are not declared. Returns the completed errors of each platform, and other parameters as remarks.
+    The parameters state accelerations, biases, distributions, terms of the clock error, and which sigmas of the file
+    are placeholders for errors that are not declared. Returns the completed errors of each platform, figures of the
+    clock error, and other parameters as remarks.
     """
     remarks = []
+    timing: dict[str, float] = {}
     for parameter in bistatic.all("AddedParameters/Parameter"):
         program, _, key = parameter.node.get("name", "").partition(" ")
-        owner, _, kind = key.partition(".")
-        error = declared_errors.get(owner)
-        if program != ADDED or error is None:
+        if program != ADDED:
             continue
-        statement = parameter.text()
-        without = {
-            "position": replace(error, correlation=(), position=None),
-            "velocity": replace(error, correlation=(), velocity=None),
-        }
-        if kind in without and statement == "not declared":
-            declared_errors[owner] = without[kind]
-        elif kind == "distribution":
-            names = tuple(statement.split())
-            declared_errors[owner] = replace(error, distribution=names if len(names) > 1 else statement)
-        elif kind == "acceleration":
-            declared_errors[owner] = replace(error, acceleration=_three(statement))
-        elif kind in _BIASES:
-            name = kind.partition(".")[0]
-            declared_errors[owner] = replace(error, biases={**error.biases, name: _three(statement)})
-        else:
+        owner, _, kind = key.partition(".")
+        error, statement = declared_errors.get(owner), parameter.text()
+        completed = None if error is None else _completed(error, kind, statement)
+        if error is not None and completed is not None:
+            if error.correlation and not completed.correlation:
+                remarks.append(f"{key}: {statement}; correlations of the errors of the {owner} are left out.")
+            declared_errors[owner] = completed
+        elif is_read_back(key) and owner == "timing" and (numbers := _leading(statement, 1)):
+            timing[kind] = numbers[0]
+        else:  # also errors of neither platform, such as `common.time_tag`: they were dropped without a word
             remarks.append(f"{key}: {statement}")
     for owner, error in declared_errors.items():
-        if error is not None and error.position is None and error.velocity is None and error.acceleration is None:
-            declared_errors[owner] = None if not error.biases else error
-    return declared_errors, remarks
+        if error is None:
+            continue
+        if error.correlation and set(_names_of(error.distribution)[: len(MEASURED_KINDS)]) != {"normal"}:
+            remarks.append(
+                f"{owner}.distribution: {error.distribution}; a mission has covariances of normal errors only."
+            )
+            declared_errors[owner] = replace(error, distribution="normal")
+        if error.position is None and error.velocity is None and error.acceleration is None and not error.biases:
+            declared_errors[owner] = None
+    return declared_errors, timing, remarks
+
+
+def _completed(error: DeclaredMotionError, kind: str, statement: str) -> DeclaredMotionError | None:
+    """Errors of a platform with what an added parameter states; None if it states nothing that a mission has."""
+    if kind == "position" and statement == "not declared":
+        return replace(error, correlation=(), position=None)
+    if kind == "velocity" and statement == "not declared":
+        return replace(error, correlation=(), velocity=None)
+    if kind == "distribution":
+        names = tuple(statement.split())
+        if len(names) not in (1, len(STATE_KINDS)) or not {"normal", "uniform", "bound"}.issuperset(names):
+            return None
+        return replace(error, distribution=names if len(names) > 1 else names[0])
+    if kind not in ("acceleration", *_BIASES) or not (numbers := _leading(statement, 3)):
+        return None
+    vector = numbers[0], numbers[1], numbers[2]
+    if kind == "acceleration":
+        return replace(error, acceleration=vector)
+    return replace(error, biases={**error.biases, kind.partition(".")[0]: vector})
+
+
+def _names_of(distribution: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (distribution,) * len(STATE_KINDS) if isinstance(distribution, str) else distribution
+
+
+def _leading(statement: str, count: int) -> list[float]:
+    """First `count` numbers of an added parameter; empty if it does not begin with as many."""
+    words = statement.split()[:count]
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        return []
+    return numbers if len(numbers) == count else []
 
 
 def of_matrices(
@@ -547,8 +599,16 @@ def mission_tree(imported: Imported) -> JsonObject:
     if imported.errors.common is not None:
         tree["common_motion_error"] = _error(imported, imported.errors.common)
         del tree["common_motion_error"]["frame"]
-    timing = {"constant": (imported.errors.timing_constant, "s"), "linear": (imported.errors.timing_linear, "")}
-    declared = {key: _quantity(value, unit).strip() for key, (value, unit) in timing.items() if value is not None}
+    errors = imported.errors
+    timing = {"constant": errors.timing_constant, "linear": errors.timing_linear, **errors.timing_added}
+    declared: JsonObject = {}
+    for term, size in TIMING_KIND.sizes.items():
+        sigma, bias = timing.get(term), timing.get(f"{term}.bias")
+        if bias is not None:  # a sigma beside a bias has no sign
+            pair = {"bias": bias} if sigma is None else {"sigma": abs(sigma), "bias": bias}
+            declared[term] = {key: _quantity(value, size.dimension.si).strip() for key, value in pair.items()}
+        elif sigma is not None:
+            declared[term] = _quantity(sigma, size.dimension.si).strip()
     if declared:
         tree["timing_error"] = declared
     return tree
@@ -616,15 +676,6 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
     return platform
 
 
-_BIASES = tuple(f"{kind.name}.bias" for kind in STATE_KINDS)  # of added parameters
-
-
-def _three(statement: str) -> Vector:
-    """First three numbers of an added parameter, as a vector."""
-    x, y, z = (float(number) for number in statement.split()[:3])
-    return x, y, z
-
-
 def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     tree: JsonObject = {"frame": error.frame}
     sigmas = {
@@ -646,9 +697,12 @@ def _error(imported: Imported, error: DeclaredMotionError) -> JsonObject:
     if error.acceleration is not None:
         tree["acceleration"] = _triple(error.acceleration, ACCELERATION_KIND.unit)
     for name, bias in error.biases.items():
-        unit = next(kind.unit for kind in STATE_KINDS if kind.name == name)
-        sigma = {"sigma": tree[name]} if name in tree else {}
-        tree[name] = {**sigma, "bias": _triple(bias, unit)}
+        kind = next(kind for kind in STATE_KINDS if kind.name == name)
+        pair = {"bias": _triple(bias, kind.unit)}
+        if name in tree:  # a sigma beside a bias has no sign
+            x, y, z = getattr(error, name)
+            pair = {"sigma": _triple((abs(x), abs(y), abs(z)), kind.unit), **pair}
+        tree[name] = pair
     if isinstance(error.distribution, tuple):
         tree["distribution"] = dict(zip((kind.name for kind in STATE_KINDS), error.distribution, strict=True))
     elif error.distribution != "normal":

@@ -31,7 +31,7 @@ from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.error_kinds.clock_kinds import TIMING_KIND
 from bisar_budget.error_kinds.path_kinds import MEASURED_KINDS, STATE_KINDS, TIME_TAG_KIND, StateKind
 from bisar_budget.faults import printable
-from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
+from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated, is_read_back
 from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector, plain_vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -331,7 +331,7 @@ def _document(
         "Dwell/NumDwellTimes": 1,
         "Dwell/DwellTime/Identifier": "1",
         "Dwell/DwellTime/DwellTimePoly": mission.collection.aperture_time,
-        **_error_parameters(mission, axes),
+        **_error_parameters(mission, axes, remarks),
         **_product(mission, targets, remarks),
     }
     root = etree.Element(f"{{{NAMESPACE}}}CPHD", nsmap={None: NAMESPACE})
@@ -436,12 +436,13 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
 
 
 # ---------------------------------------------------------------------- declared errors
-def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
+def _error_parameters(mission: Mission, axes: SceneAxes, remarks: list[str]) -> _Leaves:
     """Make the elements of `ErrorParameters` from the declared errors of both platforms.
 
     The result is empty if no errors are declared. The elements state declared sizes as one sigma, without the
     coverage factor. The sigmas of each platform include the errors that both platforms share. Errors for which the
-    standard has no element are in `AddedParameters`.
+    standard has no element are in `AddedParameters`. What `import` cannot make keys of a mission from is named in
+    sentences that are added to `remarks`.
     """
     added: dict[str, str] = {}
     leaves: _Leaves = {}
@@ -452,11 +453,23 @@ def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
         if (value := getattr(timing, term)) is not None
     }
     for owner, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
-        leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, owner, axes, added))
+        leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, owner, axes, added, remarks))
         # The schema requires CollectionStartTime.
         sensor = {**(clock_sigmas if owner == "receiver" else {}), "CollectionStartTime": 0.0}
         leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
+    for term in TIMING_KIND.sizes:
+        bias = timing.bias.get(term)
+        if bias is not None:
+            added[f"timing.{term}.bias"] = f"{bias:.12g} {TIMING_KIND.clock_size(term).dimension.si}".rstrip()
     added |= _rows_without_element(mission, added)
+    if mission.common_motion_error is not None:
+        remarks.append(
+            "a CPHD file has no error that both platforms share: the sigmas and biases of each platform hold "
+            "common_motion_error, and import takes them for errors of its own"
+        )
+    unread = [key for key in added if not is_read_back(key) and not key.endswith(".common")]
+    if unread:
+        remarks.append(f"of these errors import makes comments, and no keys of a mission: {', '.join(unread)}")
     has_no_sigmas = all(
         added.get(f"{owner}.{kind.name}") for owner in ("transmitter", "receiver") for kind in MEASURED_KINDS
     )
@@ -480,14 +493,19 @@ def _rows_without_element(mission: Mission, added: Mapping[str, str]) -> dict[st
         has_element |= isinstance(kind, StateKind) and (row.owner in PLATFORMS or kind.has_covariance)
         if row.declared is not None and not has_element and kind.is_source:
             sizes[row.id] = f"{row.declared:.12g} {row.unit}".rstrip()
+            # Biases of clocks and motion are in `added` already, the latter along the axes of the file.
+            if row.bias is not None and not isinstance(kind, StateKind) and row.subject.facts is not TIMING_KIND:
+                sizes[f"{row.id}.bias"] = f"{row.bias:.12g} {row.unit}".rstrip()
     return sizes
 
 
-def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
+def _covariance(
+    mission: Mission, owner: str, axes: SceneAxes, added: dict[str, str], remarks: list[str]
+) -> tuple[Floats, str]:
     """Compute the error covariance (6, 6) of position and velocity of one platform, and name its frame.
 
     Units are m², m²/s and m²/s². The frame is `ECF` or `RIC_ECI` of the standard. Declared errors that a covariance
-    cannot express, such as an acceleration, are added to `added` as strings.
+    cannot express, such as an acceleration, are added to `added` as strings. What is lost is added to `remarks`.
     """
     error = getattr(mission.platforms, owner).motion_error
     state: PlatformState = getattr(mission.geometry, owner)
@@ -505,28 +523,43 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
             covariance[block, block] = np.diag(np.square(stated_sigmas))
         elif error.covariance is None and (common is None or getattr(common, kind.name) is None):
             added[f"{owner}.{kind.name}"] = "not declared"
-    turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
+    is_turned = not is_radial and error.frame != "scene"
     if error.acceleration is not None:
-        added[f"{owner}.acceleration"] = _numbers(turn @ error.acceleration, "m/s^2")
+        sizes = np.array(error.acceleration)
+        if is_turned:  # the axes have independent errors: their variances add, and not the signed sizes
+            sizes = np.sqrt(np.square(np.array(source).T) @ np.square(sizes))
+            if np.ptp(np.abs(error.acceleration)) > 0:
+                remarks.append(f"{owner}.acceleration: its sizes along the scene's axes are stated as uncorrelated")
+        added[f"{owner}.acceleration"] = _numbers(sizes, "m/s^2")
+    along_file = _biases(mission, owner, is_radial=is_radial)
     for kind in STATE_KINDS:
-        bias = error.bias_of(kind.name)
-        if bias is not None:
-            added[f"{owner}.{kind.name}.bias"] = _numbers(turn @ bias, kind.unit)
+        if kind.name in along_file:
+            added[f"{owner}.{kind.name}.bias"] = _numbers(along_file[kind.name], kind.unit)
     if error.time_tag is not None:
         added[f"{owner}.time_tag"] = f"{error.time_tag:.12g} s"
     for name, biases in ((owner, error.bias), ("common", {} if common is None else common.bias)):
         if (bias := biases.get(TIME_TAG_KIND.name)) is not None:
             added[f"{name}.time_tag.bias"] = f"{bias:.12g} s"
-    for kind in STATE_KINDS:
-        bias = None if common is None else common.bias_of(kind.name)
-        if common is not None and bias is not None:
-            added[f"common.{kind.name}.bias"] = f"{_numbers(np.array(bias), kind.unit)}, frame {common.frame}"
     if error.lever_arm is not None and error.lever_arm.uncertainty is not None:
-        sizes = " ".join(f"{x:.12g}" for x in error.lever_arm.uncertainty)
-        added[f"{owner}.lever_arm.uncertainty"] = f"{sizes} m"
+        added[f"{owner}.lever_arm.uncertainty"] = _numbers(np.array(error.lever_arm.uncertainty), "m")
     if common is not None and common.time_tag is not None:
         added["common.time_tag"] = f"{common.time_tag:.12g} s"
-    distributions = [error.distribution_of(kind.name) for kind in STATE_KINDS]
+    distributions = []
+    for kind in STATE_KINDS:
+        names = [error.distribution_of(kind.name)] if any(error.stated(kind.name) or ()) else []
+        is_along_others = is_turned
+        if common is not None and kind in MEASURED_KINDS and any(getattr(common, kind.name) or ()):
+            names.append(common.distribution_of(kind.name))
+            is_along_others |= common.frame != "scene"
+        # A sum of errors, or a component along other axes, is neither uniform nor at a bound.
+        is_lost = bool(set(names) - {"normal"}) and (is_along_others or len(names) > 1)
+        if is_lost:
+            remarks.append(
+                f"{owner}.{kind.name}: the file has the sum of errors, or other axes than the mission, so that no "
+                f"distribution ({', '.join(names)}) fits: the sizes are stated as if normal"
+            )
+        default = "normal" if is_turned else error.distribution_of(kind.name)
+        distributions.append("normal" if is_lost else names[0] if names else default)
     if set(distributions) != {"normal"}:
         added[f"{owner}.distribution"] = distributions[0] if len(set(distributions)) == 1 else " ".join(distributions)
     if is_radial:
@@ -544,6 +577,30 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
         added[f"{owner}.common"] = "the sigmas hold an error that both platforms share"
     turn_of_both = np.kron(np.eye(2), np.array(axes.axes).T)
     return turn_of_both @ covariance @ turn_of_both.T, "ECF"
+
+
+def _biases(mission: Mission, owner: str, *, is_radial: bool) -> dict[str, Floats]:
+    """Biases of one platform by the kind of error, along the axes of the scene, or of `ric` if `is_radial`.
+
+    They include the biases that both platforms share: constants add, so that nothing is lost by this.
+    """
+    state: PlatformState = getattr(mission.geometry, owner)
+    biases: dict[str, Floats] = {}
+    for error in (getattr(mission.platforms, owner).motion_error, mission.common_motion_error):
+        if error is None:
+            continue
+        axes = np.array(state.frame(error.frame), dtype=float)
+        turn = np.eye(3) if is_radial else axes.T
+        for kind in STATE_KINDS:
+            bias = error.bias_of(kind.name)
+            if bias is None:
+                continue
+            biases[kind.name] = biases.get(kind.name, np.zeros(3)) + turn @ bias
+            if kind.order == 0 and error.frame == "ric" and not is_radial and state.fall is not None:
+                # As in `_along_scene`: `ric` has inertial velocities, the scene those relative to the Earth.
+                rate = np.cross(-axes @ np.array(state.fall.rotation), bias)
+                biases["velocity"] = biases.get("velocity", np.zeros(3)) + turn @ rate
+    return biases
 
 
 def _numbers(vector: Floats, unit: str) -> str:
