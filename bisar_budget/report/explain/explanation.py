@@ -69,7 +69,7 @@ from bisar_budget.report.explain.explained_error import (
     missing,
     smallest_size,
 )
-from bisar_budget.report.explain.explained_random import explained_random
+from bisar_budget.report.explain.explained_random import biased_random_use, explained_random
 from bisar_budget.report.explain.explained_spreading import (
     explained_islr,
     explained_power,
@@ -156,12 +156,13 @@ def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Ste
 def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
     analysis, model = findings.analysed(), _model(row)
     source = next((source for source in analysis.sources if source.id == row.id), None)
+    random_error = next((error for error in analysis.random if error.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
         yield from judged_steps(analysis, source)
         yield from effect(analysis, source, row.model)
         yield from _budget(analysis, source, row)
-    elif (random_error := next((error for error in analysis.random if error.id == row.id), None)) is not None:
+    elif random_error is not None:
         yield from explained_random(analysis, findings.allocation, random_error, row)
     else:
         yield from row.subject.facts.find_in(ROW_STEPS, row.subject.axis)(analysis, findings, row)
@@ -173,6 +174,9 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
     elif row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         if source is not None and row.bias is not None:
             yield biased_use(analysis, source, row)
+            return
+        if random_error is not None and random_error.biased is not None:
+            yield biased_random_use(analysis, random_error, row)
             return
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
