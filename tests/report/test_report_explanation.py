@@ -241,7 +241,7 @@ BIASED_PHASES = [
 
 
 def repeat_biases(text: str) -> None:
-    """Every row repeated by hand, where a bias of a row is stated, and where a location lists each bias."""
+    """Repeat every row by hand; each row with a bias states it."""
     mission = parse_mission(text)
     repeat_by_hand(mission)
     found = check_mission(mission, TODAY)
