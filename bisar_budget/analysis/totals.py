@@ -83,9 +83,8 @@ class Totals:
             CONSTANT: [],
         }
         for variable in variables:
-            vector = (
-                _taken(variable.effects, columns) * weights * self._scale(model, requirement, variable, case, gain)
-            )
+            scale = self._scale(model, requirement, variable, case, gain)
+            vector = _taken(variable.effects, columns) * weights * scale
             if variable.distribution == "tone":
                 vectors_of["tone"].append(np.array((vector, _taken(variable.quadrature, columns) * weights)))
             elif variable.distribution == "uniform":
@@ -99,6 +98,24 @@ class Totals:
             for name, vectors in vectors_of.items()
         }
         return RandomVector(mean, **arrays)
+
+    def biases(
+        self, model: str, requirement: str, is_member: IsMember, case: int, gain: PerCase = 1.0
+    ) -> list[tuple[str, Floats]]:
+        """Effects of the biases of the errors of some owners, each with the id of its error.
+
+        The parameters are those of `vector`, and the effects have its components. Their sum is its mean.
+        """
+        variables = [each for each in self._of(model, case) if is_member(each.owner)]
+        columns, weights = _columns(requirement, _hidden_count(variables, plain(gain, case)), plain(gain, case))
+        return [
+            (
+                each.of,
+                _taken(each.effects, columns) * weights * self._scale(model, requirement, each, case, gain),
+            )
+            for each in variables
+            if each.distribution == CONSTANT
+        ]
 
     def reached(
         self, model: str, requirement: str, is_member: IsMember, root_sum_square: Floats, gain: PerCase = 1.0

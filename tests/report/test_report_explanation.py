@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import yaml
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.error_kinds.path_kinds import STATE_KINDS
@@ -13,6 +14,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
+from tests import families
 from tests.conftest import ROOT, TODAY, by_turns, findings, mission_text, name_of
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
@@ -221,6 +223,81 @@ def test_biases_and_confidences_can_be_repeated_by_hand(model: str, rule: str, a
 def test_quantiles_of_sensors_can_be_repeated_by_hand(model: str, rule: str) -> None:
     allocation = f"allocation: {{model: {model}, combine: {rule}}}\n"
     repeat_by_hand(parse_mission(SENSORS.rstrip() + OSCILLATORS + SURE + "  islr: -20 dB\n" + allocation))
+
+
+BIASED_AIR = {
+    "both legs": "zenith_delay: { sigma: 5 cm, bias: -10 cm }",
+    "one value per leg": (
+        "transmitter: { zenith_delay: { sigma: 5 cm, bias: 10 cm } }\n"
+        "  receiver: { zenith_delay: { sigma: 5 cm, bias: -2 cm } }"
+    ),
+    "it changes": "zenith_delay: { sigma: 5 cm, bias: 10 cm }\n  correlation_time: 20 s",
+    "beyond the limit": "zenith_delay: { sigma: 5 cm, bias: 10 m }",
+}
+BIASED_PHASES = [
+    {"name": "filter", "quadratic_phase_error": {"sigma": "3 deg", "bias": "-2 deg"}},
+    {"name": "clock board", "cubic_phase_error": {"sigma": "1 deg", "bias": "2 deg"}},
+]
+
+
+def repeat_biases(text: str) -> None:
+    """Repeat every row by hand; each row with a bias states it."""
+    mission = parse_mission(text)
+    repeat_by_hand(mission)
+    found = check_mission(mission, TODAY)
+    biased = [row for row in found.rows if row.bias is not None]
+    assert biased
+    for row in biased:
+        results = dict(re.findall(r"(?m)^    (\w+) = (\S+)", explain(mission, found, row.id)))
+        assert float(results["bias"]) == pytest.approx(row.bias, rel=1e-5), row.id
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("air", BIASED_AIR)
+@pytest.mark.parametrize("asks", [True, False], ids=["sure", "one sigma"])
+def test_biases_of_random_errors_can_be_repeated_by_hand(model: str, air: str, asks: bool) -> None:
+    """A delay of the air has a bias beside its random part, and its size at a limit follows from both."""
+    rule = ["rss", "sum", "each"][list(BIASED_AIR).index(air) % 3]
+    allocation = {"model": model, "combine": rule, **({} if asks else {"coverage_factor": 2})}
+    text = mission_text(allocation=allocation, **({"autofocus__n_pull": 2} if air == "both legs" else {}))
+    text += f"propagation:\n  {BIASED_AIR[air]}\n"
+    repeat_biases(text + (SURE + "  islr: -20 dB\n" if asks else ""))
+
+
+@pytest.mark.parametrize("asks", [True, False], ids=["sure", "one sigma"])
+def test_biases_of_stated_phases_can_be_repeated_by_hand(asks: bool) -> None:
+    text = mission_text(other_errors=BIASED_PHASES, **BIASED)
+    repeat_biases(text + SURE if asks else text)
+
+
+def test_a_location_lists_the_bias_of_each_error() -> None:
+    """Errors that another row includes are not counted, nor are their biases."""
+    text = mission_text(**BIASED, allocation={"model": "full", "combine": "rss"})
+    mission = parse_mission(f"{text}propagation: {{zenith_delay: {{sigma: 5 cm, bias: 10 cm}}}}\n{SURE}")
+    found = check_mission(mission, TODAY)
+    lines = unbroken(explain(mission, found, "mission.location_error"))
+    listed = {line.split(":")[0].removeprefix("    bias of ") for line in lines if line.startswith("    bias of ")}
+    counted = {error.id for error in found.analysed().random if error.counted_in}
+    assert listed == {row.id for row in found.rows if row.bias is not None} - counted
+    assert len(listed) > 5
+
+
+@pytest.mark.parametrize("confidence", ["50 %", "95 %"])
+@pytest.mark.parametrize(("family", "seed"), [("drones", 36), ("aircraft", 3)])
+def test_ends_of_images_with_a_confidence_can_be_repeated_by_hand(family: str, seed: int, confidence: str) -> None:
+    """Where the image ends, it allows the declared size whose quantile is the size at the end."""
+    tree = yaml.safe_load(families.mission_text(family, seed))
+    tree["allocation"].pop("coverage_factor", None)  # refused beside a confidence
+    tree["allocation"]["model"] = "full"
+    limit = tree["requirements"]["quadratic_phase_error"]
+    tree["requirements"] = {
+        "quadratic_phase_error": {"limit": limit, "confidence": confidence},
+        "location_error": {"limit": "100 km", "confidence": "99.7 %"},
+    }
+    mission = parse_mission(yaml.safe_dump(tree, allow_unicode=True))
+    found = check_mission(mission, TODAY)
+    assert any("end_of_image" in explain(mission, found, row.id) for row in found.rows)
+    repeat_by_hand(mission)
 
 
 @pytest.mark.parametrize("needs", ["", "pslr: -5 dB", "islr: -5 dB, cubic_phase_error: 30 deg"])

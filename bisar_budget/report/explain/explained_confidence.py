@@ -1,7 +1,7 @@
 """Explanation steps for biases and confidences: the size that a requirement judges, and quantiles of all errors."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,11 @@ from bisar_budget.arrays import Floats
 from bisar_budget.effects.declared import CUBIC, LIMITING_REQUIREMENTS, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource, plain
 from bisar_budget.effects.error_quantiles import allowable_size, judged_size, quantile_factor
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.sources import distribution_of
+from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 
 _VARIABLE_WORDS = {
@@ -33,7 +36,8 @@ def confidence_percent(confidence: float) -> str:
 class SizeRule:
     """Rule by which the size that a requirement judges follows from the declared size of an error.
 
-    `bias` is the magnitude of the bias, in the unit of the error.
+    `bias` is the magnitude of the bias, in the unit of the error. A rule may also have effects of the bias and of the
+    random part instead of their sizes. `names` are the symbols of the two in the explanation.
     """
 
     requirement: str
@@ -41,6 +45,7 @@ class SizeRule:
     bias: float
     confidence: float | None
     unit: str
+    names: tuple[str, str] = ("bias", "declared")
 
     @classmethod
     def of(cls, analysis: Analysis, source: ErrorSource, requirement: str) -> "SizeRule":
@@ -50,6 +55,11 @@ class SizeRule:
         return cls(requirement, distribution_of(analysis.mission, source), bias, confidence, unit)
 
     @property
+    def symbol(self) -> str:
+        """Symbol of what the requirement limits, such as `location`."""
+        return _SYMBOLS[self.requirement]
+
+    @property
     def is_plain(self) -> bool:
         """Whether the requirement judges the declared size itself."""
         return self.confidence is None and not self.bias
@@ -57,11 +67,11 @@ class SizeRule:
     @property
     def words(self) -> str:
         """Text that defines the judged size."""
+        bias, declared = self.names
         if self.confidence is None:
-            return "|bias| + declared"
-        bias = "bias + " if self.bias else ""
-        variable = _VARIABLE_WORDS[self.distribution]
-        return f"{confidence_percent(self.confidence)} quantile of |{bias}declared*x|, {variable}"
+            return f"|{bias}| + {declared}"
+        terms = f"{bias} + {declared}*x" if self.bias else f"{declared}*x"
+        return f"{confidence_percent(self.confidence)} quantile of |{terms}|, {_VARIABLE_WORDS[self.distribution]}"
 
     def judged(self, size: float) -> float:
         """Judged size of an error of the declared size `size`."""
@@ -93,16 +103,34 @@ class SizeRule:
         return "" if self.bias else f"{number(quantile_factor('normal', p))}*{declared}"
 
     def _probability(self, limit: float, size: float) -> list[str]:
-        """Line that computes the probability with which a normal error with a bias keeps a limit."""
-        bias, scale = number(self.bias), f"(sqrt(2)*{number(size)})"
-        terms = " + ".join(f"erf(({number(limit)} {sign} {bias})/{scale})" for sign in "-+")
-        probability = sum(math.erf((limit + sign * self.bias) / (math.sqrt(2) * size)) / 2 for sign in (-1, 1))
-        return [Sum(f"probability = ({terms})/2 = {number(probability)}")]
+        """Lines that compute the probability with which a normal error with a bias keeps a limit.
 
-    def allowable_step(self, reached: float, allowable: float) -> Step:
-        """Step from the size that reaches a limit to the declared size of which this is the judged size."""
-        symbol, at_limit = f"by_{_SYMBOLS[self.requirement]}", f"limit_{_SYMBOLS[self.requirement]}"
+        The distances from the bias to the limit of either sign have their own lines, with six digits of their own:
+        the difference of two rounded numbers would be too coarse for a bias near the limit.
+        """
+        distances = {"near": limit - self.bias, "far": limit + self.bias}
+        terms = " + ".join(f"erf({number(distance)}/(sqrt(2)*{number(size)}))" for distance in distances.values())
+        probability = sum(math.erf(distance / (math.sqrt(2) * size)) / 2 for distance in distances.values())
+        return [
+            *(
+                Sum(f"{name} = {number(limit)} {sign} {number(self.bias)} = {with_unit(distances[name], self.unit)}")
+                for name, sign in (("near", "-"), ("far", "+"))
+            ),
+            Sum(f"probability = ({terms})/2 = {number(probability)}"),
+        ]
+
+    def allowable_step(self, reached: float, allowable: float, symbol: str = "", at_limit: str = "") -> Step:
+        """Step from the size that reaches a limit to the declared size of which this is the judged size.
+
+        `symbol` and `at_limit` are the symbols of the declared size and of the size that reaches the limit. By
+        default they are named after the requirement.
+        """
+        symbol, at_limit = symbol or f"by_{self.symbol}", at_limit or f"limit_{self.symbol}"
         title = f"Allowable by requirements.{self.requirement}: {at_limit} is its judged size, {self.words}"
+        if self.names != ("bias", "declared"):
+            title = (
+                f"{self.names[1]} at the limit of requirements.{self.requirement} on the judged effect, {self.words}"
+            )
         if not allowable:
             return step(f"{title}; the bias alone exceeds it", f"{symbol} = {with_unit(allowable, self.unit)}")
         terms = self._allowable_terms(number(reached))
@@ -162,6 +190,103 @@ def biased_use(analysis: Analysis, source: ErrorSource, row: Row) -> Step:
     return step("Utilization, the largest judged size / size at the limit", line)
 
 
+@dataclass(frozen=True, slots=True)
+class BiasedEffect:
+    """Effect of a random error with a bias, on the quantity that a requirement limits: the bias and the random part.
+
+    `per_unit` is the effect of one unit of the random part, and `lines` compute the effect of the bias.
+    """
+
+    rule: SizeRule
+    per_unit: float
+    lines: tuple[WorkedEquation, ...]
+    declared: float
+
+    @classmethod
+    def of(cls, mission: Mission, error: RandomError, model: str, requirement: str, gain: float) -> "BiasedEffect":
+        """Effect of an error with a bias in one case, with the gain of autofocus."""
+        assert error.biased is not None
+        name, bias, effect = _SYMBOLS[requirement], plain(error.biased.bias), error.effect(model)
+        per_unit = [float(each) for each in error.biased.of(0)._asdict()[model][:, 0]]
+        unit = "m" if requirement == LOCATION else "rad"
+        if requirement == LOCATION:
+            components, sigma = {"east": per_unit[2], "north": per_unit[3]}, plain(effect.displacement)
+        elif requirement == CUBIC:
+            components, sigma = {"cubic": per_unit[1]}, plain(effect.cubic)
+        else:
+            hidden = math.hypot(*per_unit[4:])
+            components = {"QPE": per_unit[0]} | ({"hidden": hidden} if hidden else {})
+            sigma = plain(effect.judged(gain))
+        lines, values = list[WorkedEquation](), dict[str, float]()
+        for component, each in components.items():
+            known_values = {"bias": bias, f"{component}/unit": each}
+            values[f"of_bias_{component}"] = bias * each
+            lines.append(
+                WorkedEquation(f"of_bias_{component}", f"bias*{component}/unit", known_values, bias * each, unit)
+            )
+        formula = "sqrt(" + " + ".join(f"{symbol}^2" for symbol in values) + ")"
+        if "hidden" in components:
+            formula, values["gain"] = "sqrt(of_bias_QPE^2 + (gain*of_bias_hidden)^2)", gain
+        length = error.biased.sizes(model, gain)[LIMITING_REQUIREMENTS.index(requirement)]
+        names = (f"bias_{name}", f"random_{name}")
+        lines.append(WorkedEquation(names[0], formula, values, plain(length), unit))
+        confidence = mission.requirements.confidence_of(requirement)
+        rule = SizeRule(requirement, error.distribution, plain(length), confidence, unit, names)
+        return cls(rule, sigma, tuple(lines), plain(error.declared))
+
+    @property
+    def judged(self) -> float:
+        """Judged effect of the declared error."""
+        return self.rule.judged(self.per_unit * self.declared)
+
+    @property
+    def is_felt(self) -> bool:
+        """Whether the bias or the random part has the effect."""
+        return self.rule.bias > 0 or self.per_unit > 0
+
+    @property
+    def symbol(self) -> str:
+        """Symbol of the effect, such as `location`."""
+        return self.rule.symbol
+
+    def judged_steps(self, effect_symbol: str) -> Iterator[Step]:
+        """Yield the steps to the judged effect.
+
+        `effect_symbol` is the symbol of the effect of one unit, such as `QPE/unit`.
+        """
+        random_effect, unit = self.per_unit * self.declared, self.rule.unit
+        values = {effect_symbol: self.per_unit, "declared": self.declared}
+        random_line = WorkedEquation(self.rule.names[1], f"{effect_symbol}*declared", values, random_effect, unit)
+        yield step(
+            f"For requirements.{self.rule.requirement}: effect of the bias, and of the random part",
+            *self.lines,
+            random_line,
+        )
+        lines = self.rule.judged_line(f"judged_{self.symbol}", random_effect)
+        yield step(f"Judged effect, {self.rule.words}", *lines)
+
+    def allowable_steps(self, limit: float, effect_symbol: str, unit: str) -> Iterator[Step]:
+        """Yield the steps from a limit to the declared size whose judged effect is the limit."""
+        most, size = self.rule.allowable(limit), self.allowable(limit)
+        if size is None:
+            return
+        if not self.per_unit:
+            yield step("The bias alone exceeds the limit", f"by_{self.symbol} = {with_unit(size, unit)}")
+            return
+        yield self.rule.allowable_step(limit, most, f"most_{self.symbol}")
+        values = {f"most_{self.symbol}": most, effect_symbol: self.per_unit}
+        formula = f"most_{self.symbol}/({effect_symbol})"
+        yield step(
+            "Declared size with this random part", WorkedEquation(f"by_{self.symbol}", formula, values, size, unit)
+        )
+
+    def allowable(self, limit: float) -> float | None:
+        """Declared size whose judged effect is a limit; None if every size keeps the limit."""
+        if self.per_unit > 0:
+            return self.rule.allowable(limit) / self.per_unit
+        return 0.0 if self.rule.bias > limit else None
+
+
 def quantile_step(name: str, rms_name: str, rms: float, quantile: float, unit: str, confidence: float) -> Step:
     """Step from the rms effect of a random error to the effect that it does not exceed with a confidence.
 
@@ -193,7 +318,8 @@ def total_steps(
     unit = "m" if requirement == LOCATION else "rad"
     vector = totals.vector(model, requirement, is_member, 0, gain)
     bias = float(np.linalg.norm(vector.mean))
-    lines = [_bias_line(vector.mean, bias, unit)] if bias else []
+    biases = totals.biases(model, requirement, is_member, 0, gain)
+    lines = _bias_lines(requirement, biases, vector.mean, unit) if bias else []
     confidence = analysis.mission.requirements.confidence_of(requirement)
     if confidence is None:
         text = f"{number(bias)} + {number(root_sum_square)}"
@@ -208,6 +334,24 @@ def total_steps(
     yield step(title, *lines, f"{symbol} = {with_unit(total, unit)}", *ratio)
 
 
-def _bias_line(mean: Floats, bias: float, unit: str) -> str:
+def _bias_lines(requirement: str, biases: Sequence[tuple[str, Floats]], mean: Floats, unit: str) -> list[str]:
+    """Lines with the effect of each bias, their sum along each component, and the length of this sum.
+
+    The phases that a finite band hides are components of the quadratic phase, because they have signs too. They
+    include the gain of autofocus.
+    """
+    names = {LOCATION: ["east", "north"], CUBIC: ["cubic"]}.get(requirement, ["QPE"])
+    names += [f"hidden_{index + 1}" for index in range(len(mean) - len(names))]
+    lines = []
+    for error_id, effects in biases:
+        components = [
+            f"{with_unit(float(each), unit)} {name}" for name, each in zip(names, effects, strict=True) if each
+        ]
+        if components:
+            lines.append(f"bias of {printable(error_id)}: {', '.join(components)}")
+    for index, name in enumerate(names):
+        along = [number(float(effects[index])) for _, effects in biases if effects[index]]
+        if len(along) > 1:
+            lines.append(Sum(f"bias_{name} = {' + '.join(along)} = {with_unit(float(mean[index]), unit)}"))
     terms = " + ".join(f"{number(float(effect))}^2" for effect in mean if effect) or "0"
-    return Sum(f"bias = sqrt({terms}) = {with_unit(bias, unit)}")
+    return [*lines, Sum(f"bias = sqrt({terms}) = {with_unit(float(np.linalg.norm(mean)), unit)}")]

@@ -740,7 +740,7 @@ def _displacement_of(residual: Residual) -> float:
     return math.hypot(*(residual.image_point or (0.0, 0.0)))
 
 
-def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
+def end_of_the_image(size: float, unit: str, symbol: str = "by_image") -> Iterator[Step]:
     """Yield the explanation step for the largest error at which an image point exists: `size` in `unit`.
 
     For a larger error, no ground point has the recorded range history.
@@ -748,7 +748,7 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
     yield step(
         "End of the image: no ground point has the range history of a larger error of either sign",
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
-        f"by_image = {with_unit(size, unit)}, a limit for any allowed phase or displacement",
+        f"{symbol} = {with_unit(size, unit)}, a limit for any allowed phase or displacement",
     )
 
 

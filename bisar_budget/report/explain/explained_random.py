@@ -63,7 +63,7 @@ from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import AIR_TOP_M, height_of
 from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
-from bisar_budget.report.explain.explained_confidence import quantile_step
+from bisar_budget.report.explain.explained_confidence import BiasedEffect, quantile_step
 from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
 from bisar_budget.report.explain.explained_navigation import navigation_steps
 from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
@@ -101,6 +101,8 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     yield from stated(mission, error.path, error.declared, row.evidence)
     if error.declared is None:
         return
+    if error.biased is not None:
+        yield step("Known and constant, with its sign", f"bias = {with_unit(plain(error.biased.bias), error.unit)}")
     if error.unit == "s^2/m":
         yield step(f"Per g is per {STANDARD_GRAVITY_MPS2:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY_MPS2:.6g} s²/m")
     k = mission.allocation.coverage_factor
@@ -738,6 +740,17 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     sizes: dict[str, float] = {}
     required = mission.requirements
 
+    def with_bias(requirement: str, symbol: str, allowed: float) -> Iterator[Step]:
+        """Yield the steps for an error with a bias, which changes the size at the limit and the quantile."""
+        biased = BiasedEffect.of(mission, error, model, requirement, allocation.autofocus_gain)
+        if biased.is_felt:
+            yield from biased.judged_steps(symbol)
+            yield from biased.allowable_steps(allowed, symbol, _unit(error))
+            if (size := biased.allowable(allowed)) is not None:
+                sizes[f"by_{biased.symbol}"] = size
+
+    has_bias = error.biased is not None and error.declared is not None
+
     def by(name: str, symbol: str, allowed: float, per_unit: float, title: str) -> Step:
         sizes[name] = allowed / per_unit
         values = {"limit": allowed, symbol: per_unit}
@@ -751,13 +764,17 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
             symbol, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, rms_phase, f"rad{_per(error)}"
         )
         yield step("With the hidden phase, which autofocus does not correct", worked)
-    if limited.quadratic:
+    if has_bias:
+        yield from with_bias(QUADRATIC, symbol, limit)
+    elif limited.quadratic:
         if (confidence := error.is_covered and confidence_of(QUADRATIC)) and rms_phase:
             unit = f"rad{_per(error)}"
             yield quantile_step("quantile/unit", symbol, rms_phase, plain(limited.quadratic), unit, confidence)
             symbol = "quantile/unit"
         yield by("by_QPE", symbol, limit, limited.quadratic, "Allowable by the quadratic phase")
-    if effect.cubic and required.cubic_phase_error is not None:
+    if has_bias and required.cubic_phase_error is not None:
+        yield from with_bias(CUBIC, "cubic/unit", required.cubic_phase_error)
+    elif effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
         symbol = "cubic/unit"
         if confidence := error.is_covered and confidence_of(CUBIC):
@@ -773,7 +790,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
         energy = mainlobe_energy(mission)
         rule, values = allowed_variance(model, power, energy)
-        rms = spread_phase(power, model, energy) * math.sqrt(share)
+        rms = _allowed_rms(mission, allocation, error, model, required.islr)
         worked = WorkedEquation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
         yield step(f"Residual phase allowed, requirements.islr {required.islr:g} dB, share s of its power", worked)
         sizes["by_ISLR"] = rms / limited.spread
@@ -782,7 +799,9 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
         worked = WorkedEquation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield step("Allowable by requirements.islr", worked)
-    if effect.displacement > 0 and required.location_error is not None:
+    if has_bias and required.location_error is not None:
+        yield from with_bias(LOCATION, "moved/unit", required.location_error)
+    elif effect.displacement > 0 and required.location_error is not None:
         title = f"Allowable by requirements.{LOCATION}, without share and gain"
         symbol, rms_move, moved = "moved/unit", plain(effect.displacement), plain(judged.displacement)
         if confidence := error.is_covered and confidence_of(LOCATION):
@@ -790,6 +809,31 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
             symbol = "quantile/unit"
         yield by("by_location", symbol, required.location_error, moved, title)
     yield from smallest_size(row, sizes)
+
+
+def _allowed_rms(mission: Mission, allocation: Allocation, error: RandomError, model: str, islr: float) -> float:
+    """Residual rms phase that an error may cause under a required ISLR, by its share of the power. [rad]"""
+    share = allocation.islr.of(error.owner)
+    return float(spread_phase(10 ** (islr / 10), model, mainlobe_energy(mission)) * math.sqrt(share))
+
+
+def biased_random_use(analysis: Analysis, error: RandomError, row: Row) -> Step:
+    """Return the explanation step for the utilization of a random error with a bias, from its judged effects."""
+    mission, allocation, model = analysis.mission, analysis.allocation, row.model or "published"
+    required, terms = mission.requirements, list[str]()
+    limits = (allocation.qpe_allowed(error.owner), required.cubic_phase_error, required.location_error)
+    for requirement, limit in zip((QUADRATIC, CUBIC, LOCATION), limits, strict=True):
+        if limit is not None:
+            biased = BiasedEffect.of(mission, error, model, requirement, allocation.autofocus_gain)
+            if biased.is_felt:
+                terms.append(f"{number(biased.judged)}/{number(limit)}")
+    limited = held_effect(mission, error.effect(model), error.coverage(mission))
+    if limited.spread and required.islr is not None:  # a power without the bias
+        by_islr = _allowed_rms(mission, allocation, error, model, required.islr) / limited.spread
+        terms.append(f"{number(plain(error.declared))}/{number(by_islr)}")
+    text = f"max({', '.join(terms)})" if len(terms) > 1 else "".join(terms) or "0"
+    line = Sum(f"utilization = {text} = {number(row.utilization or 0.0)}")
+    return step("Utilization, the largest judged effect / limit", line)
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:

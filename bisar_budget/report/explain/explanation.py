@@ -69,7 +69,7 @@ from bisar_budget.report.explain.explained_error import (
     missing,
     smallest_size,
 )
-from bisar_budget.report.explain.explained_random import explained_random
+from bisar_budget.report.explain.explained_random import biased_random_use, explained_random
 from bisar_budget.report.explain.explained_spreading import (
     explained_islr,
     explained_power,
@@ -156,12 +156,13 @@ def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Ste
 def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
     analysis, model = findings.analysed(), _model(row)
     source = next((source for source in analysis.sources if source.id == row.id), None)
+    random_error = next((error for error in analysis.random if error.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
         yield from judged_steps(analysis, source)
         yield from effect(analysis, source, row.model)
         yield from _budget(analysis, source, row)
-    elif (random_error := next((error for error in analysis.random if error.id == row.id), None)) is not None:
+    elif random_error is not None:
         yield from explained_random(analysis, findings.allocation, random_error, row)
     else:
         yield from row.subject.facts.find_in(ROW_STEPS, row.subject.axis)(analysis, findings, row)
@@ -173,6 +174,9 @@ def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> It
     elif row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         if source is not None and row.bias is not None:
             yield biased_use(analysis, source, row)
+            return
+        if random_error is not None and random_error.biased is not None:
+            yield biased_random_use(analysis, random_error, row)
             return
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
@@ -219,11 +223,14 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
     sizes: dict[str, float] = {}
     rules = rules_of(analysis, source)
+    ends: list[tuple[SizeRule, float, float]] = []
     if by_quadratic is not None:
         rule = rules[QUADRATIC]
         reached = by_quadratic if rule.is_plain else model.allowable(source, QUADRATIC, limit)
-        if reached is None or model.ends_image(source, reached):
+        if reached is None:
             sizes["by_image"] = by_quadratic
+        elif model.ends_image(source, reached):
+            ends.append((rule, reached, by_quadratic))
         else:
             sizes["by_QPE"] = by_quadratic
             yield from _reaching_quadratic(analysis, source, row, limit, reached, rule)
@@ -243,7 +250,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             size = row.allowable  # the search of the check may differ in the last digits
             reached = size if rule.is_plain else reached
         if model.ends_image(source, reached):
-            sizes["by_image"] = size
+            ends.append((rule, reached, size))
             continue
         sizes[symbol] = size
         title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
@@ -258,9 +265,28 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             yield step(title, WorkedEquation(symbol, "limit/(effect/unit)", values, reached, row.unit))
         if not rule.is_plain:
             yield rule.allowable_step(reached, size)
+    yield from _by_image(row, ends, sizes)
+    yield from smallest_size(row, sizes)
+
+
+def _by_image(row: Row, ends: Sequence[tuple[SizeRule, float, float]], sizes: dict[str, float]) -> Iterator[Step]:
+    """Yield the explanation steps for the end of the image, and add the declared sizes that it allows to `sizes`.
+
+    `ends` has the rule of each requirement whose limit is not reached before the image ends, the size at the end, and
+    the declared size that the rule allows. The sizes differ, because each requirement judges its own quantile.
+    """
+    for rule, _, size in ends:
+        if rule.is_plain:
+            sizes["by_image"] = size
     if "by_image" in sizes:
         yield from end_of_the_image(sizes["by_image"], row.unit)
-    yield from smallest_size(row, sizes)
+    judged = [each for each in ends if not each[0].is_plain]
+    if judged:
+        yield from end_of_the_image(judged[0][1], row.unit, "end_of_image")
+    for rule, reached, size in judged:
+        symbol = f"by_image_for_{rule.symbol}"
+        yield rule.allowable_step(reached, size, symbol, "end_of_image")
+        sizes[symbol] = size
 
 
 def _reaching_quadratic(
