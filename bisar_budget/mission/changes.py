@@ -18,6 +18,7 @@ from bisar_budget.mission.readers import (
     INVALID,
     ListOf,
     OneOf,
+    Paired,
     Reader,
     RegisteredSizes,
     Section,
@@ -98,6 +99,9 @@ def _take_out(tree: Tree, change: SetValue) -> None:
     container: Content = tree.root
     path: KeyPath = ()
     while True:
+        pair = pair_at(container, path, steps[0])
+        if pair is not None and steps[0] == pair.name_of_number:
+            container = _spread(tree, path, container, pair)
         name, remaining = next_name(container, steps, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         is_entry = isinstance(container, list)
         if name is None or (is_entry and (not remaining or int(name) >= len(container))) or container is INVALID:
@@ -130,6 +134,8 @@ def _apply(tree: Tree, change: SetValue) -> None:
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
+        if (pair := pair_at(container, path, steps[0])) is not None:
+            container = _spread(tree, path, container, pair)
         name, remaining = next_name(container, steps, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         if name is None:
             tree.changes[path] = change
@@ -156,6 +162,44 @@ def _apply(tree: Tree, change: SetValue) -> None:
     _forget(tree, path)
     tree.values[first_new or path] = Changed()
     _put(container, name, value)
+
+
+def pair_at(content: Content, path: Sequence[str | int], step: str) -> Paired | None:
+    """Reader of the number at `path`, if `step` is a key of its form as a section, such as `confidence`.
+
+    The result is None if `content` is no number alone, so that it already has keys.
+    """
+    if not isinstance(content, str | list) or (isinstance(content, list) and is_index(step)):
+        return None
+    readers = _readers_at(MISSION, path)
+    return next((reader for reader in readers if isinstance(reader, Paired) and step in reader.pair.keys), None)
+
+
+def _readers_at(reader: Reader[object], path: Sequence[str | int]) -> Iterator[Reader[object]]:
+    """Yield the reader at a path below `reader`; several if a section on the path has several forms."""
+    if not path:
+        yield reader
+        return
+    for form in reader.forms if isinstance(reader, OneOf) else (reader,):
+        if (below := form.below(str(path[0]))) is not None:
+            yield from _readers_at(below, path[1:])
+
+
+def _spread(tree: Tree, path: KeyPath, content: Content, pair: Paired) -> Content:
+    """Write a number alone as a section, so that an option can put a second value beside it.
+
+    The positions in the file move with the number, so that a fault in it is still found there. `content` is the
+    number, and `pair` is the reader of the section. Returns the section.
+    """
+    section = pair.as_section(content)
+    container = tree.root
+    for name in path[:-1]:
+        container = container[name]
+    container[path[-1]] = section
+    number_path = (*path, pair.name_of_number)
+    for below in [below for below in tree.values if below[: len(path)] == path]:
+        tree.values[*number_path, *below[len(path) :]] = tree.values[below]
+    return section
 
 
 def next_name(

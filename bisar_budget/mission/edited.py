@@ -8,11 +8,12 @@ from typing import Any
 import yaml
 
 from bisar_budget.faults import SetValue
-from bisar_budget.mission.changes import next_name, parts_of, takes_out
+from bisar_budget.mission.changes import next_name, pair_at, parts_of, takes_out
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import is_file
 from bisar_budget.mission.paths import path_files
+from bisar_budget.mission.readers import Paired
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 Node = Any
@@ -89,6 +90,7 @@ def _named_part_files(mission: Mission) -> Iterator[tuple[str, str]]:
 def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
     """Set the value of a key in the text of a mission file; `steps` are the keys and list indices of its path."""
     node: Node = yaml.compose(text, Loader=_LOADER)
+    all_steps = steps
     while True:
         key, remaining = _next(node, steps)
         inner = _below(node, key)
@@ -96,9 +98,29 @@ def _with_value(text: str, steps: tuple[str, ...], value: str) -> str:
             return _with_entry(text, node, key, remaining, value)
         if not remaining:
             return _replaced(text, inner, value, _end_of_key(node, key))
+        if (pair := _pair_at(inner, all_steps[: len(all_steps) - len(remaining)], remaining[0])) is not None:
+            section = f"{{{pair.name_of_number}: {_in_one_line(text, inner)}}}"
+            return _with_value(_replaced(text, inner, section, _end_of_key(node, key)), all_steps, value)
         if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # an empty section
             return _replaced(text, inner, _nested(remaining, value), _end_of_key(node, key))
         node, steps = inner, remaining
+
+
+def _pair_at(node: Node, path: Sequence[str], step: str) -> Paired | None:
+    """Reader of the number at `path`, if the key `step` needs the number in the form of a section.
+
+    The result is None if `node`, the node at `path`, is an empty value or already a section.
+    """
+    if isinstance(node, yaml.SequenceNode):
+        return pair_at([], path, step)
+    return pair_at(node.value, path, step) if isinstance(node, yaml.ScalarNode) and node.value else None
+
+
+def _in_one_line(text: str, node: Node) -> str:
+    """Text of a number or a list of numbers that can stand in braces; a list of lines becomes one in brackets."""
+    if isinstance(node, yaml.SequenceNode):
+        return f"[{', '.join(_in_one_line(text, entry) for entry in node.value)}]"
+    return text[node.start_mark.index : node.end_mark.index]
 
 
 def _without_key(text: str, parts: tuple[str, ...]) -> str:

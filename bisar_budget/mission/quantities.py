@@ -45,6 +45,7 @@ from bisar_budget.mission.readers import (
     SIZE_FIELD,
     ListOf,
     OneOf,
+    Paired,
     Quantity,
     Reader,
     Section,
@@ -178,6 +179,9 @@ def tree_of(mission: Mission) -> JsonObject:
 def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
     """Find the number at a key, with its unit; a single value that applies to all three axes counts as a number.
 
+    The size of an error with a bias is its sigma, and a requirement with a confidence has its limit as the number.
+    The key of the result is then that of the sigma or the limit, so that a new number leaves the other value alone.
+
     Parameters
     ----------
     tree : dict
@@ -196,6 +200,8 @@ def number_of(tree: JsonObject, key: str, of_all: str = "", *, is_for_each: bool
         The key does not exist or has no number.
     """
     reader, value = _reader_and_value(tree, key)
+    if isinstance(reader, Paired) and isinstance(value, dict):
+        return number_of(tree, f"{key}.{reader.name_of_number}", of_all, is_for_each=is_for_each)
     reader = form_of(reader, value)
     if isinstance(reader, Triple):
         if is_for_each and reader.or_scalar and isinstance(value, list):
@@ -260,6 +266,8 @@ def _reader_and_value(tree: JsonObject, key: str) -> tuple[Reader[object], Conte
     value: Content = tree
     steps = parts_of(key)
     while steps:
+        if isinstance(reader, Paired) and not isinstance(value, dict) and steps[0] in reader.pair.keys:
+            value = reader.as_section(value)  # a size alone is a sigma, and a limit alone has no confidence
         reader = form_of(reader, value)
         name, remaining = next_name(value, steps)
         child, steps = (steps[0], steps[1:]) if name is None else (str(name), remaining)

@@ -940,7 +940,27 @@ class _SizeAndBias(_Pair):
         return WithContent(pair.get(SIZE_FIELD, self.unstated), BIAS_FIELD, pair.get(BIAS_FIELD))
 
 
-class WithBias(OneOf[SectionValue]):
+class Paired(OneOf[SectionValue]):
+    """A number, or a section with this number and a second value beside it.
+
+    Parameters
+    ----------
+    plain : Quantity or Triple
+        Reader of the number alone.
+    pair : Section
+        Reader of the section; its first key is that of the number.
+    """
+
+    def __init__(self, plain: "Quantity | Triple", pair: Section[SectionValue]) -> None:
+        self.pair, self.name_of_number = pair, next(iter(pair.keys))
+        super().__init__(lambda value: pair if isinstance(value, dict) else plain, (plain, pair))
+
+    def as_section(self, value: object) -> dict[str, object]:
+        """Section that means the same as a number alone; empty for None."""
+        return {} if value is None else {self.name_of_number: value}
+
+
+class WithBias(Paired):
     """Reader of the size of an error with an optional bias: a size, or `{sigma: …, bias: …}`.
 
     Parameters
@@ -960,8 +980,7 @@ class WithBias(OneOf[SectionValue]):
         }
         # A position or velocity without a sigma may stand beside a covariance.
         unstated = None if isinstance(plain, Triple) else 0.0
-        self.pair = _SizeAndBias(name, "Size of an error and its bias.", keys, unstated)
-        super().__init__(lambda value: self.pair if isinstance(value, dict) else plain, (plain, self.pair))
+        super().__init__(plain, _SizeAndBias(name, "Size of an error and its bias.", keys, unstated))
 
 
 class _Bias(Quantity):
@@ -1049,16 +1068,15 @@ class _LimitAndConfidence(_Pair):
         return WithContent(pair.get(LIMIT_FIELD, self.default), CONFIDENCE_FIELD, text)
 
 
-class WithConfidence(OneOf[SectionValue]):
+class WithConfidence(Paired):
     """Reader of a requirement: a limit, or `{limit: …, confidence: …}`.
 
     `default` is the limit of a section that states only a confidence; None if such a section is refused.
     """
 
     def __init__(self, limit: "Quantity", name: str, default: float | None = None) -> None:
-        pair = _LimitAndConfidence(limit, name, default)
         self.limit = limit
-        super().__init__(lambda value: pair if isinstance(value, dict) else limit, (limit, pair))
+        super().__init__(limit, _LimitAndConfidence(limit, name, default))
 
 
 class Level(Quantity):

@@ -253,9 +253,9 @@ def _written(line: RequirementEntry) -> str | list[str] | dict[str, str]:
     return line.limit.text
 
 
-def _limit(line: RequirementEntry) -> object:
-    """Limit of a line in SI units, as converted by the reader of the key."""
-    return _LIMITS[line.key.text].read(_written(line), (), lambda path, problem: None)
+def _limit(key: str, written: object) -> object:
+    """Limit in SI units, as converted by the reader of the key."""
+    return _LIMITS[key].read(written, (), lambda path, problem: None)
 
 
 def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
@@ -265,7 +265,7 @@ def _hold_together(lines: Sequence[RequirementEntry], faults: _Faults) -> None:
     for line in lines:
         if line.limit.text or line.confidence.text:
             first = limits.setdefault(line.key.text, line)
-            if _limit(first) != _limit(line):
+            if _limit(line.key.text, _written(first)) != _limit(line.key.text, _written(line)):
                 problem = f"{line.key.text} has another limit in line {first.limit.line}, {shown(first.limit.text)}"
                 faults.at(line.limit, "limit", problem, "accepted: one limit for each key")
         if line.text.text and texts.setdefault(line.id.text, line).text.text != line.text.text:
@@ -335,19 +335,57 @@ class _Into:
         if "requirements." + key in self.changed or path in self.added:
             return
         section = self.tree.root["requirements"]
-        if key in section:
+        written, of_options = self._beside_options(key, line, section.get(key))
+        if key in section and section[key] != of_options:
             stated = section[key]
-            value = INVALID if stated is INVALID else _LIMITS[key].read(stated, (), lambda path, problem: None)
-            if value is not INVALID and value != _limit(line):
+            value = INVALID if stated is INVALID else _limit(key, stated)
+            if value is not INVALID and value != _limit(key, written):
                 problem = f"is {shown(line.limit.text)} in {self.name}:{line.limit.line}"
                 self.tree.report(path, Problem(problem, "accepted: one of the two, or the same limit"))
             return
-        section[key] = _written(line)
+        section[key] = written
         self.added.add(path)
-        self._put(path, line.limit.text)
-        if line.confidence.text:
-            self._put((*path, LIMIT_FIELD), line.limit.text)
-            self._put((*path, CONFIDENCE_FIELD), line.confidence.text)
+        if not of_options:
+            self._put(path, line.limit.text)
+        if isinstance(written, dict):
+            cells = {LIMIT_FIELD: line.limit, CONFIDENCE_FIELD: line.confidence}
+            for field in written.keys() - of_options.keys():
+                self._put((*path, field), cells[field].text)
+
+    def _beside_options(self, key: str, line: RequirementEntry, stated: object) -> tuple[object, dict[str, object]]:
+        """Limit of a line as a mission file would state it, with what options put beside it.
+
+        An option may set the limit or the confidence alone, and the line then still states the other one. `stated` is
+        the value in the tree. The second result has the values of options by `limit` and `confidence`.
+        """
+        written: object = _written(line)
+        changed = [
+            field for field in (LIMIT_FIELD, CONFIDENCE_FIELD) if f"requirements.{key}.{field}" in self.changed
+        ]
+        reader, values = _LIMITS[key], stated if isinstance(stated, dict) else {}
+        if not isinstance(reader, WithConfidence):
+            return written, {}
+        if CONFIDENCE_FIELD in values and LIMIT_FIELD not in values and CONFIDENCE_FIELD not in changed:
+            # The mission file states only the confidence, as an option may.
+            self._compare_confidence(key, line, values[CONFIDENCE_FIELD])
+            changed.append(CONFIDENCE_FIELD)
+        if not changed:
+            return written, {}
+        of_options = {field: values[field] for field in changed if field in values}
+        pair = written if isinstance(written, dict) else reader.as_section(written)
+        # A field that an option takes out is not put back.
+        return {field: text for field, text in pair.items() if field not in changed} | of_options, of_options
+
+    def _compare_confidence(self, key: str, line: RequirementEntry, stated: object) -> None:
+        """Report a confidence of the mission file, without a limit, that differs from the confidence of a line."""
+        of_line, of_file = (
+            _limit(key, {LIMIT_FIELD: line.limit.text, CONFIDENCE_FIELD: confidence})
+            for confidence in (line.confidence.text, stated)
+        )
+        if line.confidence.text and of_file is not INVALID and of_line != of_file:
+            problem = f"is {shown(line.confidence.text)} in {self.name}:{line.confidence.line}"
+            path = ("requirements", key, CONFIDENCE_FIELD)
+            self.tree.report(path, Problem(problem, "accepted: one of the two, or the same confidence"))
 
     def _id(self, row_id: str, own_id: str) -> None:
         section, path = self._section("requirement_ids"), ("requirement_ids", row_id)

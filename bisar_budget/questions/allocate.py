@@ -27,7 +27,6 @@ from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import Outside
 from bisar_budget.findings.specification import MIN_ROOM_FRACTION, Broken, RowUse, Specification, SpecificationSheet
-from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry
 from bisar_budget.mission.quantities import QuestionError, tree_of
@@ -159,7 +158,7 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
     limits_in_words = []
     for error in errors:
-        owner, *_, name = [part for part in parts_of(error.key) if part != "platforms"]
+        owner, *_, name = [part for part in error.steps if part != "platforms"]
         limits = [row for row in rows if (row.owner, row.subject.kind) == (owner, name) and row.allowable]
         if limits:
             least = min(limits, key=lambda row: row.allowable or math.inf)

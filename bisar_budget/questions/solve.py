@@ -221,6 +221,7 @@ class _Search:
             scaled(self.base, key, 1.0)  # raises the problem of the key
         else:
             self.number = of_table = number_of(tree_of(mission), key, _OF_ALL).said_like(between)
+        self.key = of_table.key  # beside a bias it is that of the sigma
         self.range: Range = range_of(self.number, between)
 
         def judged() -> Iterator[JudgedMission]:
@@ -243,7 +244,7 @@ class _Search:
         scanned, file_state = self.scanned(progress)
         borders = [(low, high) for low, high in pairwise(scanned) if low.complies != high.complies]
         crossings = self.crossings(borders)
-        (key,) = self.question.keys
+        key = self.key
         missions = [state for state in scanned if not state.reason]
         if not missions:
             raise QuestionError(f"{key}: no value of the range makes a mission: {scanned[0].reason}")

@@ -24,6 +24,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
+from bisar_budget.mission.readers import SIZE_FIELD
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 ORDERED_DIGITS = 2  # number of significant digits of an ordered number
@@ -73,6 +74,12 @@ class Specified(NamedTuple):
     def key(self) -> str:
         """Key of the number in the mission file, as a path such as `platforms.receiver.oscillator.level`."""
         return self.number.key
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """Keys on the path of the error; its size alone and the sigma beside a bias have the same."""
+        steps = parts_of(self.key)
+        return steps[:-1] if steps[-1] == SIZE_FIELD else steps
 
     @property
     def nothing(self) -> float:
@@ -144,7 +151,7 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
     weights = keys or mission.allocation.specify or dict.fromkeys(usual_keys(mission), 1.0)
     if not weights:
         raise QuestionError(
-            "nothing to specify: every error of the mission comes from a part, a covariance or a path; "
+            "nothing to specify: every error of the mission comes from a part, a covariance or a path, or is a bias; "
             "name one with --for KEY"
         )
     errors = [Specified(_number(mission, tree, key), weight) for key, weight in weights.items()]
@@ -159,7 +166,8 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
 def usual_keys(mission: Mission) -> Iterator[str]:
     """Yield the keys that are specified by default: position, velocity, acceleration and clock errors.
 
-    Errors that a part or a covariance determines are left out. An aided navigation determines the errors of
+    Errors that a part or a covariance determines are left out. So is a bias without a random part, because it is
+    known and constant; beside a bias, the random part is specified. An aided navigation determines the errors of
     velocity and acceleration; its level is specified instead.
     """
     for name in PLATFORMS:
@@ -168,7 +176,8 @@ def usual_keys(mission: Mission) -> Iterator[str]:
         is_aided = error.navigation is not None
         for state in STATE_KINDS[:1] if platform.state.is_still or is_aided else STATE_KINDS:
             is_fixed = error.covariance is not None and state.has_covariance
-            if not is_fixed and state.name not in dict(error.of_parts):
+            is_bias = error.bias_of(state.name) is not None and not np.any(error.stated(state.name))
+            if not is_fixed and not is_bias and state.name not in dict(error.of_parts):
                 yield ".".join(map(str, state.section(name)))
         if is_aided and not error.navigation.part_sources:
             yield ".".join(map(str, NAVIGATION_KIND.path(name)))
@@ -176,7 +185,9 @@ def usual_keys(mission: Mission) -> Iterator[str]:
     for name in oscillators:
         if getattr(mission.platforms, name).oscillator.sensor is None:
             yield _level_of_oscillator(name)
-    if not oscillators and not mission.has_direct_path:
+    clock = mission.timing_error
+    is_bias = clock.bias.get("quadratic") is not None and not clock.quadratic
+    if not oscillators and not mission.has_direct_path and not is_bias:
         yield ".".join(map(str, TIMING_KIND.path("clock", "quadratic")))
 
 
@@ -206,7 +217,8 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
     if number.value is not None:
         return number
     taken = next((figure.value for figure in mission.taken if figure.key == key), None)
-    components = [as_number(key, number.reader, text) for text in (taken if isinstance(taken, list) else [taken])]
+    texts = taken if isinstance(taken, list) else [taken]
+    components = [as_number(number.key, number.reader, text) for text in texts]
     return max(components, key=lambda component: abs(component.value or 0.0))
 
 
@@ -248,7 +260,7 @@ def suitable_parts(mission: Mission, specified: Specified, most: float, candidat
     For a satellite only sensors that work in orbit are listed: export rules disable receivers for ground and air use
     above 515 m/s or 18 km, and inertial sensors measure nothing in free fall.
     """
-    *above, section, figure = parts_of(specified.key)
+    *above, section, figure = specified.steps
     for name in PLATFORMS:
         if specified.key == _level_of_oscillator(name):
             yield from _quiet_oscillators(mission, name, most, candidates)

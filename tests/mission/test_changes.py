@@ -191,3 +191,40 @@ class TestTakingOut:
     )
     def test_the_text_of_a_file_without_a_key(self, text: str, key: str, left: str) -> None:
         assert with_values(text, [SetValue(key, "null")]) == left
+
+
+LIMIT_ALONE = TEXT.replace("requirements:", "requirements:\n  location_error: 5 m", 1)
+
+
+def test_a_confidence_is_put_beside_a_limit_alone() -> None:
+    mission = changed("requirements.location_error.confidence=99 %", data=LIMIT_ALONE)
+    assert mission.requirements.location_error == 5.0
+    assert mission.requirements.confidence_of("location_error") == 0.99
+    same = changed("requirements.location_error={limit: 5 m, confidence: 99 %}", data=LIMIT_ALONE)
+    assert mission.requirements == same.requirements
+
+
+def test_a_bias_is_put_beside_a_size_alone() -> None:
+    key = "platforms.receiver.motion_error.velocity"
+    for size in ("2 mm/s", "[2 mm/s, 2 mm/s, 2 mm/s]"):
+        error = changed(f"{key}={size}", f"{key}.bias=[0, 0, 1 mm/s]").platforms.receiver.motion_error
+        assert (error.velocity, error.bias_of("velocity")) == ((2e-3,) * 3, (0.0, 0.0, 1e-3))
+    assert changed(f"{key}={size}", f"{key}.sigma=3 mm/s").platforms.receiver.motion_error.velocity == (3e-3,) * 3
+
+
+def test_a_wrong_value_is_that_of_its_option_and_not_of_the_number_beside_it() -> None:
+    option = "--set requirements.location_error.confidence"
+    assert f"{option}: must be a probability" in fault("requirements.location_error.confidence=9", data=LIMIT_ALONE)
+    line = fault("requirements.location_error.confidence=99 %", data=LIMIT_ALONE.replace(" 5 m", " 5 kg", 1))
+    assert "requirements.location_error.limit: has the unknown unit 'kg'" in line
+    assert "--set" not in line.partition("Read with")[0]
+
+
+def test_null_beside_a_number_alone_takes_out_what_it_names() -> None:
+    kept = changed("requirements.location_error.confidence=null", data=LIMIT_ALONE)
+    assert kept.requirements == changed(data=LIMIT_ALONE).requirements
+    assert "must not be taken out" in fault("requirements.location_error.limit=null", data=LIMIT_ALONE)
+
+
+def test_other_numbers_have_no_keys() -> None:
+    assert "radar.bandwidth: has no keys" in fault("radar.bandwidth.bias=1 Hz")

@@ -3,6 +3,7 @@
 import difflib
 
 import pytest
+import yaml
 
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.edited import with_section, with_values
@@ -61,6 +62,33 @@ def comments(text: str) -> list[str]:
 )
 def test_one_value(text: str, key: str, edited: str) -> None:
     assert with_values(text, [SetValue(key, "9")]) == edited
+
+
+@pytest.mark.parametrize(
+    ("above", "below"),
+    [
+        ("requirements:\n  islr: 5 m # so\n", None),
+        (
+            "requirements:\n  location_error: 5 m # so\n",
+            "requirements:\n  location_error: {limit: 5 m, confidence: 9} # so\n",
+        ),
+        ("requirements: {location_error: 5 m}\n", "requirements: {location_error: {limit: 5 m, confidence: 9}}\n"),
+    ],
+)
+def test_a_confidence_beside_a_limit_alone(above: str, below: str | None) -> None:
+    name = "location_error" if below else "other"
+    edited = with_values(above, [SetValue(f"requirements.{name}.confidence", "9")])
+    assert edited == (below or f"{above}  other: {{confidence: 9}}\n")
+
+
+@pytest.mark.parametrize("size", ["[1 s, 2 s] # so\n", "\n    - 1 s\n    - 2 s # so\n"])
+def test_a_bias_beside_the_sizes_of_axes(size: str) -> None:
+    text = f"common_motion_error:\n  position: {size}  frame: scene\n"
+    edited = with_values(text, [SetValue("common_motion_error.position.bias", "9")])
+    assert yaml.safe_load(edited) == {
+        "common_motion_error": {"position": {"sigma": ["1 s", "2 s"], "bias": 9}, "frame": "scene"}
+    }
+    assert "# so" in edited
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import yaml
 
 from bisar_budget.cli.touched import touched_missions
 from bisar_budget.faults import MissionError
+from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.edited import in_folder
 from bisar_budget.mission.load import load_mission, named_by
 from bisar_budget.mission.model import mission_schema
@@ -340,3 +341,55 @@ def test_lines_are_read_with_their_places() -> None:
         ("-3 dB", 2, 13),
         ("", 2, 18),
     ]
+
+
+class TestOptionsBesideAConfidence:
+    """An option sets the limit or the confidence alone, and the table still states the other one."""
+
+    PLAIN = "id,text,key,limit\nA-1,,location_error,5 m\n"
+    BOTH = "id,text,key,limit,confidence\nA-1,,location_error,5 m,95 %\n"
+
+    @pytest.mark.parametrize("csv", [PLAIN, BOTH])
+    @pytest.mark.parametrize(
+        ("option", "limit", "confidence"),
+        [
+            ("confidence=99 %", 5.0, 0.99),
+            ("limit=7 m", 7.0, 0.95),
+            ("confidence=null", 5.0, None),
+        ],
+    )
+    def test_the_other_is_that_of_the_table(self, stated, csv, option, limit, confidence) -> None:
+        given = load_mission(str(stated(csv)), changes=read_changes([f"requirements.location_error.{option}"]))
+        stays = csv == self.BOTH or not option.startswith("limit")
+        needs = given.requirements
+        assert needs.location_error == limit
+        assert needs.confidence_of("location_error") == (confidence if stays else None)
+        assert given.requirement_ids == {"requirement.location_error": ("A-1",)}
+
+    def test_a_file_that_states_the_same_may_be_changed_too(self, stated) -> None:
+        both = {"file": "reqs.csv", "location_error": {"limit": "5 m", "confidence": "95 %"}}
+        path = str(stated(self.BOTH, requirements=both))
+        given = load_mission(path, changes=read_changes(["requirements.location_error.confidence=99 %"]))
+        assert given.requirements.confidence_of("location_error") == 0.99
+
+    def test_the_file_may_state_the_confidence_of_a_limit_in_the_table(self, stated) -> None:
+        path = stated(self.PLAIN, requirements={"file": "reqs.csv", "location_error": {"confidence": "99 %"}})
+        needs = load_mission(str(path)).requirements
+        assert (needs.location_error, needs.confidence_of("location_error")) == (5.0, 0.99)
+
+    def test_a_confidence_of_the_file_without_a_limit_agrees_with_the_table(self, stated) -> None:
+        alone = {"file": "reqs.csv", "location_error": {"confidence": "0.95"}}
+        needs = load_mission(str(stated(self.BOTH, requirements=alone))).requirements
+        assert (needs.location_error, needs.confidence_of("location_error")) == (5.0, 0.95)
+        (line,) = faults(stated(self.BOTH.replace("95", "90"), requirements=alone))
+        assert (
+            "requirements.location_error.confidence: is 90 % in reqs.csv:2 (got 0.95); accepted: one of the" in line
+        )
+
+    def test_two_different_confidences_are_a_fault(self, stated) -> None:
+        both = {"file": "reqs.csv", "location_error": {"limit": "5 m", "confidence": "99 %"}}
+        assert any("accepted: one of the two" in line for line in faults(stated(self.BOTH, requirements=both)))
+
+    def test_a_wrong_confidence_is_that_of_the_option(self, stated) -> None:
+        with pytest.raises(MissionError, match=r"--set requirements\.location_error\.confidence: must be a"):
+            load_mission(str(stated()), changes=read_changes(["requirements.location_error.confidence=9"]))

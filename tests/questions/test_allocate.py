@@ -356,3 +356,65 @@ def test_every_example_has_a_sheet_that_its_check_passes(file) -> None:
     if not sheet.broken:  # elements of two days ago are further off than the position error that is allowed
         reasons = [str(one.reason) for one in sheet.requirements if one.status == "not_evaluated"]
         assert sheet.complies or all("the path may be" in reason for reason in reasons), reasons
+
+
+POSITION = "platforms.transmitter.motion_error.position"
+BIAS = {"bias": ["0 m", "0 m", "40 cm"]}
+
+
+def biased(**sigma: str) -> Mission:
+    """A mission whose transmitter has a bias of position, beside a sigma or alone."""
+    return mission(requirements__location_error="20 m", platforms__transmitter__motion_error__position=sigma | BIAS)
+
+
+@pytest.mark.parametrize("keys", [None, POSITION, f"{POSITION}.sigma"])
+def test_beside_a_bias_the_sigma_is_specified_and_the_bias_is_kept(keys: str | None) -> None:
+    sheet = bb.allocate(biased(sigma="50 cm"), keys, date=DAY).found
+    first = sheet.specifications[0]
+    assert (first.key, first.declared) == (f"{POSITION}.sigma", 0.5)
+    assert sheet.complies
+    assert sheet.findings is not None
+    assert sheet.findings.mission is not None
+    error = sheet.findings.mission.platforms.transmitter.motion_error
+    assert (error.position, error.bias_of("position")) == ((first.ordered,) * 3, (0.0, 0.0, 0.4))
+
+
+def test_a_bias_without_a_sigma_is_not_specified_by_default() -> None:
+    usual = list(usual_keys(biased()))
+    assert POSITION not in usual
+    assert usual == [key for key in usual_keys(biased(sigma="50 cm")) if key != POSITION]
+    clock = "timing_error.quadratic"
+    assert clock in list(usual_keys(mission(timing_error={"quadratic": {"sigma": "1e-12 1/s", "bias": "1e-12 1/s"}})))
+    assert clock not in list(usual_keys(mission(timing_error={"quadratic": {"bias": "1e-12 1/s"}})))
+
+
+def test_a_bias_alone_that_is_named_gets_a_sigma_beside_it() -> None:
+    (one,) = bb.allocate(biased(), POSITION, date=DAY).found.specifications
+    assert (one.key, one.declared) == (f"{POSITION}.sigma", None)
+    assert one.value is not None
+
+
+def test_the_sigma_beside_a_bias_is_specified_once() -> None:
+    with pytest.raises(QuestionError, match="is specified twice"):
+        bb.allocate(biased(sigma="50 cm"), [POSITION, f"{POSITION}.sigma"], date=DAY)
+
+
+def test_parts_and_single_allowables_are_found_for_a_sigma_too() -> None:
+    """Both take the kind of error from the key, which ends in `sigma` beside a bias."""
+    (one,) = bb.allocate(biased(sigma="50 cm"), POSITION, date=DAY).found.specifications
+    (alone,) = bb.allocate(mission(requirements__location_error="20 m"), POSITION, date=DAY).found.specifications
+    assert set(one.parts) & set(alone.parts)
+    given = biased(sigma="50 cm")
+    each = parse_mission(given.data, "m.yaml", changes=[SetValue("allocation.combine", "each")])
+    with pytest.raises(QuestionError, match=rf"are the answer: {POSITION}\.sigma \d+ cm"):
+        bb.allocate(each, POSITION, date=DAY)
+
+
+@pytest.mark.parametrize("size", ["50 cm", {"sigma": "50 cm"} | BIAS])
+def test_an_offer_may_state_the_size_in_either_form(size: object) -> None:
+    offer = mission(requirements__location_error="20 m", platforms__transmitter__motion_error__position=size)
+    for ordered in (biased(sigma="1 m"), mission(requirements__location_error="20 m")):
+        compared = bb.allocate(ordered, POSITION, offer=offer, date=DAY).offer
+        assert compared is not None
+        (figure,) = compared.figures
+        assert (figure.value, figure.is_inside) == (0.5, True)

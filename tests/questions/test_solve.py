@@ -400,3 +400,35 @@ def test_a_range_of_a_unit_per_g(between: str) -> None:
     assert asked.low == pytest.approx(1e-12 / 9.80665, rel=1e-12)
     assert asked.high == pytest.approx(2e-9 / 9.80665, rel=1e-12)
     assert number.said_like(between).unit in ("/g", "1/g")
+
+
+def test_beside_a_bias_the_sigma_is_searched_for() -> None:
+    """The key of such a figure means its sigma; the bias and the confidence stay as they are."""
+    position, location = "platforms.transmitter.motion_error.position", "requirements.location_error"
+    given = parse_mission(
+        mission_text(
+            allocation={"combine": "rss", "model": "full"},
+            platforms__transmitter__motion_error__position={"sigma": "50 cm", "bias": ["0 m", "0 m", "4 m"]},
+            platforms__receiver__motion_error__position="1 m",
+            requirements__location_error={"limit": "20 m", "confidence": "95 %"},
+        ),
+        "m.yaml",
+    )
+    for key, named, between in (
+        (position, f"{position}.sigma", "1 cm..1 km"),
+        (location, f"{location}.limit", "10 cm..20 m"),
+    ):
+        found, same = (
+            bb.solve(given, one, between=between, row="mission.location_error", date=DAY).found
+            for one in (key, named)
+        )
+        assert isinstance(found, Solution)
+        assert found == same
+        assert found.key == named
+        (crossing,) = found.crossings
+        assert crossing.is_verified
+        changes = [SetValue(named, f"{crossing.outside.value!r} m")]
+        rows = check_mission(parse_mission(given.data, "m.yaml", changes=changes), DAY).rows
+        (row,) = (row for row in rows if row.id == "mission.location_error")
+        assert row.utilization == pytest.approx(1, abs=1e-5)
+        assert row.status == "fail"

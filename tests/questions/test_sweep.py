@@ -888,3 +888,34 @@ class TestWords:
         cases = cases_of(tree_of(mission), ["allocation.model=full"])
         with pytest.raises(QuestionError, match="--model stands in for it"):
             Asked(mission, cases, model="full", today=DAY)
+
+
+def test_the_sigma_beside_a_bias_and_the_limit_beside_a_confidence_vary() -> None:
+    position, location = "platforms.transmitter.motion_error.position", "requirements.location_error"
+    given = parse_mission(
+        mission_text(
+            allocation={"combine": "rss", "model": "full"},
+            platforms__transmitter__motion_error__position={"sigma": "50 cm", "bias": ["0 m", "0 m", "40 cm"]},
+            platforms__receiver__motion_error__position="1 m",
+            requirements__location_error={"limit": "20 m", "confidence": "95 %"},
+        ),
+        "m.yaml",
+    )
+    cases = cases_of(tree_of(given), [f"{position}=10 cm,3 m", f"{location}=5 m,20 m"])
+    assert [one.key for one in cases.varied] == [f"{position}.sigma", f"{location}.limit"]
+    uses = swept(given, cases)["utilization"]
+    assert len(set(uses)) == 4
+    for use, (sigma, limit) in zip(uses, [(a, b) for a in ("10 cm", "3 m") for b in ("5 m", "20 m")], strict=True):
+        changes = [SetValue(f"{position}.sigma", sigma), SetValue(f"{location}.limit", limit)]
+        findings = check_mission(parse_mission(given.data, "m.yaml", changes=changes), DAY)
+        assert use == pytest.approx(max(one.utilization or 0.0 for one in findings.requirements), rel=NEAR)
+
+
+def test_a_confidence_varies_beside_a_limit_alone() -> None:
+    key = "requirements.location_error.confidence"
+    rules = {"combine": "rss", "model": "full"}
+    errors = {"platforms__receiver__motion_error__position": "1 m"}
+    given = parse_mission(mission_text(requirements__location_error="20 m", allocation=rules, **errors), "m.yaml")
+    column = "mission.location_error.utilization"
+    low, high = swept(given, cases_of(tree_of(given), [f"{key}=80 %,99 %"]), [column])[column]
+    assert low < high
