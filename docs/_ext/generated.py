@@ -159,8 +159,8 @@ def _documents() -> list[dict[str, Any]]:
     return [json.loads(text) for text in texts]
 
 
-# Mappings whose keys are names of the mission, not of the contract.
-_NAMED = ("summary", "requirement_texts")
+# Mappings whose keys are names of the mission or probabilities in percent.
+_NAMED = ("summary", "requirement_texts", "percentiles", "percentiles_range", "percentiles_azimuth")
 
 
 def _leaves(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
