@@ -150,35 +150,30 @@ class Together:
 
         The list is empty under rules other than root-sum-square. The phases of the errors include biases there.
         """
-        return [
-            DeclaredPhase(row_id + BIAS_SUFFIX, owner, qpe, cubic, 1.0)._replace(hidden_rad=hidden)
-            for row_id, owner, qpe, cubic, hidden, _ in self._effects_of_biases()
-        ]
+        return [phase for phase, _ in self._effects_of_biases()]
 
     @cached_property
     def moves_of_biases(self) -> Moves:
         """Displacements of the image due to the biases of the declared errors; see `biases`. [m]"""
-        return [(row_id + BIAS_SUFFIX, moved) for row_id, *_, moved in self._effects_of_biases() if moved is not None]
+        return [(phase.row_id, moved) for phase, moved in self._effects_of_biases() if moved is not None]
 
-    def _effects_of_biases(self) -> Iterator[tuple[Any, ...]]:
-        """Yield row id, owner, quadratic, cubic and hidden phase, and displacement of each bias."""
+    def _effects_of_biases(self) -> Iterator[tuple[DeclaredPhase, tuple[PerCase, PerCase] | None]]:
+        """Yield the phases of each bias and its displacement, east and north, which a pure phase does not have."""
         if self.rule != "rss":
             return
         for error in self.errors.stated:
             if np.any(error.bias):
                 does = self.errors.of_bias(self.model, error)
-                is_motion = error.is_motion
-                yield (
-                    *(error.subject.id, error.subject.owner),
-                    *(does.qpe, does.cubic if is_motion else None, does.hidden),
-                    does.displacement if is_motion else None,
-                )
+                cubic, moved = (does.cubic, does.displacement) if error.is_motion else (None, None)
+                phase = DeclaredPhase(error.subject.id + BIAS_SUFFIX, error.subject.owner, does.qpe, cubic)
+                yield phase._replace(hidden_rad=does.hidden), moved
         for random in self.random:
             if random.biased is not None:
                 effects = random.biased.signed(self.model)
                 hidden = np.sqrt(np.square(effects[4:]).sum(axis=0))
                 quadratic, cubic, east, north, hidden = map(self.errors.array, (*effects[:4], hidden))
-                yield random.subject.id, random.subject.owner, quadratic, cubic, hidden, (east, north)
+                phase = DeclaredPhase(random.subject.id + BIAS_SUFFIX, random.subject.owner, quadratic, cubic)
+                yield phase._replace(hidden_rad=hidden), (east, north)
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """List the phases of the declared errors that count against an owner's share of the budget.
