@@ -177,12 +177,13 @@ class _Predictions:
     def probability(self, judged: HeldSum) -> float:
         """Probability that the sum of the errors is within the limit, computed from their distributions.
 
-        The effects are of first order in small errors, see `totals`.
+        The effects are of first order in small errors, see `totals`. The result is 0 if an error of its declared size
+        leaves no image, since its effect has no distribution then.
         """
         vector = self.totals.vector(
             "full", _LIMITED_BY_COLUMN[judged.columns[0]], judged.owners.__contains__, 0, judged.gain
         )
-        return vector.probability(judged.limit)
+        return vector.probability(judged.limit) if vector.is_finite else 0.0
 
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that the sum of the errors is within the limit, for normally distributed errors.

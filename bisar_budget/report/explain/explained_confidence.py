@@ -317,6 +317,8 @@ def total_steps(
         return
     unit = "m" if requirement == LOCATION else "rad"
     vector = totals.vector(model, requirement, is_member, 0, gain)
+    if not vector.is_finite:  # an error leaves no image
+        return
     bias = float(np.linalg.norm(vector.mean))
     biases = totals.biases(model, requirement, is_member, 0, gain)
     lines = _bias_lines(requirement, biases, vector.mean, unit) if bias else []

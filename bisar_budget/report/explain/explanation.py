@@ -591,7 +591,8 @@ def _pull_in(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterato
     The limit is the pull-in range of autofocus.
     """
     together, allocation = analysis.together(_model(row)), findings.allocation
-    sizes_by_name = together.phase_parts(quadratics(together.owed(allocation.qpe, row.owner)), "sum")
+    members = [*together.owed(allocation.qpe, row.owner), *together.biases]
+    sizes_by_name = together.phase_parts(quadratics(members), "sum")
     yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
     values = {"N_pull": allocation.n_pull or 0.0}
     worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
